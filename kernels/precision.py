@@ -1,0 +1,213 @@
+"""One source for both precisions: the types of a precision, and laws translated to it.
+
+Float literals and ``float`` annotations mean float32 to Warp. :func:`translate` rewrites a law
+written in plain Python for the precision at hand, so that one law serves both.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import hashlib
+import inspect
+import linecache
+import re
+import textwrap
+import types
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+# Generic names that a law may use, and what they become in float64.
+_DOUBLE = {
+    name: getattr(wp, f"{name}d")
+    for name in ("vec2", "vec3", "vec4", "mat22", "mat33", "mat44", "quat")
+}
+_DOUBLE["float32"] = wp.float64
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Scalar and vector types of one floating point precision."""
+
+    name: str
+    scalar: type
+    vec3: type
+    numpy: type
+    c: str  # the scalar's name in native code
+
+    def vector(self, length: int) -> type:
+        """Vector type of ``length`` scalars of this precision."""
+        return wp.types.vector(length=length, dtype=self.scalar)
+
+
+FLOAT32 = Precision("float32", wp.float32, wp.vec3f, np.float32, "float")
+FLOAT64 = Precision("float64", wp.float64, wp.vec3d, np.float64, "double")
+PRECISIONS = {"float32": FLOAT32, "float64": FLOAT64}
+
+
+class _Double(ast.NodeTransformer):
+    """Rewrites float literals, ``float`` and Warp's short vector names to float64."""
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        if isinstance(node.value, float):
+            call = ast.Call(func=_name("_float64", node), args=[node], keywords=[])
+            return ast.copy_location(call, node)
+        return node
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        return _name("_float64", node) if node.id == "float" else node
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        is_warp = isinstance(node.value, ast.Name) and node.value.id in ("wp", "warp")
+        if is_warp and node.attr in _DOUBLE:
+            return _name(f"_{node.attr}_double", node)
+        return self.generic_visit(node)
+
+    def visit_arguments(self, node: ast.arguments) -> ast.AST:
+        return node  # annotations are mapped by value, see `annotation`
+
+
+def _name(name: str, node: ast.AST) -> ast.AST:
+    return ast.copy_location(ast.Name(id=name, ctx=ast.Load()), node)
+
+
+def annotation(kind: Any, precision: Precision) -> Any:
+    """The type that ``kind``, as written in a law, has in ``precision``."""
+    if kind in (float, wp.float32, inspect.Parameter.empty, "float"):
+        return precision.scalar
+    if precision is FLOAT64:
+        for name, double in _DOUBLE.items():
+            if kind is getattr(wp, name):
+                return double
+    return kind
+
+
+def translate(
+    func: Callable[..., Any],
+    precision: Precision,
+    resolve: Callable[[Any], Any] = lambda value: value,
+) -> wp.Function:
+    """Make a Warp function of ``func`` in ``precision``.
+
+    ``resolve`` maps global and closure values that the law refers to (other laws) to what the
+    Warp function should call. The native name is a hash of the source, so that native snippets
+    can call it by name and the kernel cache on disk is found again by the next process.
+    """
+    source = textwrap.dedent(inspect.getsource(func))
+    extra = {"_float64": wp.float64, **{f"_{k}_double": v for k, v in _DOUBLE.items()}}
+    names = func.__globals__.keys() & set(func.__code__.co_names) - {func.__name__}
+    used = {name: resolve(func.__globals__[name]) for name in names}
+    copy = types.FunctionType(
+        func.__code__,
+        {**func.__globals__, **used, **extra},
+        func.__name__,
+        func.__defaults__,
+        tuple(types.CellType(resolve(c.cell_contents)) for c in func.__closure__ or ()) or None,
+    )
+    copy.__module__ = func.__module__
+    copy.__annotations__ = {}
+    hints = {
+        name: annotation(parameter.annotation, precision)
+        for name, parameter in inspect.signature(func, eval_str=True).parameters.items()
+    }
+    closure = repr([getattr(c.cell_contents, "name", c.cell_contents) for c in copy.__closure__ or ()])
+    digest = hashlib.sha256((source + closure + precision.name).encode()).hexdigest()[:12]
+    return wp.Function(
+        copy,
+        key=func.__name__,
+        namespace="",
+        module=wp.get_module(func.__module__),
+        native_func=f"law_{func.__name__}_{digest}",
+        overloaded_annotations=hints,
+        code_transformers=[_Double()] if precision is FLOAT64 else [],
+        source=_without_decorators(source),
+    )
+
+
+def _without_decorators(source: str) -> str:
+    tree = ast.parse(source)
+    definition = tree.body[0]
+    if isinstance(definition, ast.FunctionDef):
+        definition.decorator_list = []
+    return ast.unparse(tree)
+
+
+def function(func: Callable[..., Any]) -> wp.Function:
+    """Register ``func``, annotated with Warp types, under a native name that repeats in every run.
+
+    ``wp.func`` numbers its native names by the order of creation; functions that native snippets
+    call by name would then miss the kernel cache whenever that order changes. The name hashes
+    the source and the closure, by the native names of the functions in it.
+    """
+    cells = [c.cell_contents for c in func.__closure__ or ()]
+    parts = [getattr(c, "native_func", None) or repr(c) for c in cells]
+    text = inspect.getsource(func) + "|".join(parts) + repr(func.__annotations__)
+    digest = hashlib.sha256(text.encode()).hexdigest()[:12]
+    return wp.Function(
+        func,
+        key=func.__name__,
+        namespace="",
+        module=wp.get_module(func.__module__),
+        native_func=f"{func.__name__}_{digest}",
+    )
+
+
+def native(stub: Callable[..., Any], snippet: str, after_gradients: bool = True) -> wp.Function:
+    """A function whose body is C++, named after its content like :func:`function`.
+
+    ``after_gradients`` has Warp emit it together with the functions that use ``wp.grad``, behind
+    the adjoints that those call, so that the snippet may call a derived law by name.
+    """
+    digest = hashlib.sha256((snippet + repr(stub.__annotations__)).encode()).hexdigest()[:12]
+    result = wp.Function(
+        stub,
+        key=stub.__name__,
+        namespace="",
+        module=wp.get_module(stub.__module__),
+        native_snippet=snippet,
+        native_func=f"{stub.__name__}_{digest}",
+        # Warp honours the return type only where it reads its own decorator in the source.
+        source="@wp.func_native()\n" + textwrap.dedent(inspect.getsource(stub)),
+    )
+    result.adj.uses_grad_call = after_gradients
+    return result
+
+
+KERNELS: list[wp.Kernel] = []  # every kernel built in this process, for the CUDA compile test
+
+kernel = functools.partial(wp.kernel, enable_backward=False, module="unique")
+
+
+def register(func: Callable[..., Any]) -> wp.Kernel:
+    """Make a kernel without a backward pass, in a module of its own, and remember it."""
+    made = kernel(func)
+    KERNELS.append(made)
+    return made
+
+
+def structure(name: str, fields: dict[str, Any]) -> Any:
+    """A ``wp.struct`` of the given fields."""
+    return wp.struct(type(name, (), {"__annotations__": dict(fields), "__module__": __name__}))
+
+
+def function_from_source(source: str, namespace: dict[str, Any]) -> wp.Function:
+    """Make a Warp function of generated source; ``namespace`` holds the names it refers to."""
+    name = re.search(r"def (\w+)\(", source).group(1)
+    parts = [f"{k}={getattr(v, 'native_func', None) or repr(v)}" for k, v in namespace.items()]
+    digest = hashlib.sha256((source + "|".join(parts)).encode()).hexdigest()[:12]
+    filename = f"<particlesim {name} {digest}>"
+    scope = dict(namespace)
+    exec(compile(source, filename, "exec"), scope)
+    # Warp reads the source back through inspect, which asks linecache.
+    linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
+    return wp.Function(
+        scope[name],
+        key=name,
+        namespace="",
+        module=wp.get_module(__name__),
+        native_func=f"{name}_{digest}",
+    )

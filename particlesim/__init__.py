@@ -1,0 +1,43 @@
+"""particlesim: a general particle-physics framework on NVIDIA Warp."""
+
+from . import sample
+from .errors import SimulationError
+from .interactions import (
+    ConstantForce,
+    Drag,
+    Gravity,
+    Interaction,
+    LennardJones,
+    PairForce,
+    PairPotential,
+    ParticleForce,
+    Springs,
+    UniformGravity,
+)
+from .law import Law, law
+from .scene import Group, Scene
+from .settings import Settings
+from .simulation import Simulation
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "ConstantForce",
+    "Drag",
+    "Gravity",
+    "Group",
+    "Interaction",
+    "Law",
+    "LennardJones",
+    "PairForce",
+    "PairPotential",
+    "ParticleForce",
+    "Scene",
+    "Settings",
+    "Simulation",
+    "SimulationError",
+    "Springs",
+    "UniformGravity",
+    "law",
+    "sample",
+]

@@ -1,0 +1,1 @@
+"""Constraints: what projects positions after integration."""

@@ -1,0 +1,54 @@
+"""What every constraint shares: when it is called, and what it may keep between substeps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from ..interactions.base import Bindable
+
+if TYPE_CHECKING:
+    import warp as wp
+
+    from ..model import Model
+    from ..neighbors import Neighbors
+    from ..state import State
+
+
+class ConstraintBase(Bindable):
+    """Acts on positions after integration.
+
+    In a substep: ``begin`` once, then ``project`` in each iteration, in turn with the other
+    constraints, then, when the velocities have followed the projection, ``finish``. Corrections
+    are added to ``state.position`` and, the same amount, to ``state.correction``.
+    """
+
+    requires: frozenset[str] = frozenset()
+
+    def prepare(self, model: Model, neighbors: Neighbors) -> None:
+        """Once: merge the worlds' tuples and parameters, request neighbours."""
+        raise NotImplementedError
+
+    def attach(self, model: Model, state: State) -> None:
+        """Once, when all arrays exist."""
+
+    def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        """At the start of a substep's projection: launches only."""
+
+    def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        """One sweep: launches only."""
+        raise NotImplementedError
+
+    def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        """After the velocities have followed: restitution, breaking. Launches only."""
+
+    def persistent(self) -> dict[str, wp.array]:
+        """Arrays that outlive a substep, for snapshots and checkpoints."""
+        return {}
+
+    def reset(self, worlds: Sequence[int]) -> None:
+        """Forget what these worlds have left behind."""
+
+    def shapes(self) -> list[dict[str, Any]]:
+        """Static shapes to draw."""
+        return []

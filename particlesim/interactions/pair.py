@@ -1,0 +1,209 @@
+"""Forces between pairs of particles: any law, within a cutoff or between all."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from .. import validate
+from ..kernels import pair as kernels
+from ..kernels.precision import structure
+from ..launch import launch
+from ..law import Law
+from ..law import law as make_law
+from .base import Arguments, Interaction
+
+if TYPE_CHECKING:
+    from ..model import Model
+    from ..neighbors import Neighbors
+    from ..state import State
+
+# Closer than this, particles count as coincident: in parts of the cutoff, and without a cutoff.
+COINCIDENT, CLOSEST = 1e-6, 1e-12
+
+
+class Pair(Interaction):
+    """Base of central pair forces f_ij = F(r) (x_i - x_j) / r.
+
+    A member gives a potential u(r), a force F(r) = -du/dr, or both; what is missing is derived
+    (the force from the potential) or goes without (no energy is reported for a force alone).
+    Coincident particles are pushed apart along a fixed direction, equally and opposite.
+
+    Args:
+        potential: Law ``u(r, ...)`` [energy], or None.
+        force: Law ``F(r, ...)`` [force], positive where it repels, or None.
+        group: Which particles interact with each other; None: all.
+        cutoff: Distance beyond which there is no force [length]; None: all pairs.
+        parameters: Values of the law's further parameters. Parameters that are not given are
+            quantities of the two particles, named ``mass_i``, ``charge_j`` and so on.
+    """
+
+    def __init__(
+        self,
+        potential: Law | None,
+        force: Law | None,
+        group: Any,
+        cutoff: float | None,
+        parameters: dict[str, Any],
+    ):
+        self.potential, self.force, self.group = potential, force, group
+        self.cutoff = (
+            None
+            if cutoff is None
+            else validate.number(self.name, "cutoff", cutoff, above=0.0, unit="length")
+        )
+        chosen = [each for each in (potential, force) if each is not None]
+        for each in chosen:
+            if not each.parameters:
+                raise validate.fail(
+                    self.name, "law", "take the distance r as its first parameter", each.name,
+                    "write def law(r, ...)",
+                )  # fmt: skip
+        self.arguments = [
+            Arguments(self.name, each, 1, parameters, ("_i", "_j")) for each in chosen
+        ]
+        self.parameters = {}
+        self.quantities: set[str] = set()
+        for each in self.arguments:
+            self.parameters |= each.values
+            self.quantities |= each.quantities
+        self.requires = frozenset({"force"}) | self.quantities
+
+    def kind(self) -> tuple[Any, ...]:
+        laws = [each and each.func for each in (self.potential, self.force)]
+        return (type(self), *laws, self.cutoff is None, tuple(self.parameters))
+
+    def prepare(self, model: Model, neighbors: Neighbors) -> None:
+        self.model = model
+        for each in self.arguments:
+            each.check(model.attributes)
+        members = model.members([peer.group for peer in self.peers], self.name)
+        cutoff = (
+            None if self.cutoff is None else np.array([peer.cutoff for peer in self.peers], float)
+        )
+        self.pairs = neighbors.request(
+            self.name, members, cutoff, self.quantities | {"position"}
+        )
+        columns = self.columns(self.parameters)
+        columns["cutoff_squared"] = (
+            np.full(model.world_count, np.finfo(model.precision.numpy).max)
+            if cutoff is None
+            else cutoff**2
+        )
+        columns["closest_squared"] = (
+            np.full(model.world_count, CLOSEST**2) if cutoff is None else (COINCIDENT * cutoff) ** 2
+        )
+        self.Params, self.params = model.parameters("PairParameters", columns)
+
+    def attach(self, model: Model, state: State) -> None:
+        fields = {"x": self.pairs.fields["position"]}
+        fields |= {name: self.pairs.fields[name] for name in self.quantities if name != "position"}
+        self.Data = structure_of("PairData", fields)
+        self.data = filled(self.Data, fields)
+        out = {"f": state.force}
+        self.Out = structure_of("PairForces", out)
+        self.out = filled(self.Out, out)
+        precision = model.precision
+        chosen, derivative = (self.potential, True) if self.force is None else (self.force, False)
+        arguments = self.arguments[-1].source({"_i": "i", "_j": "j"})
+        term = kernels.force_term(
+            chosen.function(precision), arguments, derivative, precision, self.Data, self.Params
+        )
+        store = kernels.add_force(precision, self.Data, self.Params, self.Out)
+        self.kernel = self._kernel(term, store, self.Out, 3, vectorised=model.device.is_cpu)
+
+    def _kernel(self, term: Any, store: Any, out: Any, width: int, vectorised: bool) -> Any:
+        model = self.model
+        return kernels.pair_kernel(
+            term, store, self.Data, self.Params, out, width, model.precision, model.periodic,
+            self.pairs.partners, vectorised,
+        )  # fmt: skip
+
+    def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        launch(
+            self.kernel,
+            self.pairs.count,
+            [self.pairs.pairs, self.model.box, self.params, self.data, self.out],
+            self.model.device,
+        )
+
+    def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
+        if self.potential is None:
+            return
+        precision, out = self.model.precision, {"energy": energy, "virial": virial}
+        Out = structure_of("PairMeasures", out)
+        arguments = self.arguments[0].source({"_i": "i", "_j": "j"})
+        term = kernels.measure_term(
+            self.potential.function(precision), arguments, precision, self.Data, self.Params
+        )
+        store = kernels.store_measure(precision, self.Data, self.Params, Out)
+        kernel = self._kernel(term, store, Out, 2, vectorised=self.model.device.is_cpu)
+        inputs = [self.pairs.pairs, self.model.box, self.params, self.data, filled(Out, out)]
+        launch(kernel, self.pairs.count, inputs, self.model.device)
+
+
+class PairPotential(Pair):
+    """Pair force from an energy law: f = -du/dr, derived by ``wp.grad`` inside the kernel.
+
+    Args:
+        law: ``u(r, ...)`` [energy]; made by :func:`particlesim.law` or a plain function.
+        group: Which particles interact with each other; None: all.
+        cutoff: Distance beyond which there is no force [length]; None: all pairs of a world.
+        **parameters: The law's further parameters; those not given are quantities of the two
+            particles (``charge_i``, ``mass_j``).
+
+    Example:
+        >>> @law
+        ... def yukawa(r: float, strength: float, screening: float):
+        ...     return strength * wp.exp(-r / screening) / r
+        >>> PairPotential(yukawa, cutoff=5.0, strength=1.0, screening=0.7).parameters
+        {'strength': 1.0, 'screening': 0.7}
+    """
+
+    def __init__(self, law: Any, group: Any = None, *, cutoff: float | None, **parameters: Any):
+        super().__init__(as_law(law), None, group, cutoff, parameters)
+
+
+class PairForce(Pair):
+    """Pair force F(r) along the pair, given directly; positive repels.
+
+    Arguments as for :class:`PairPotential`. No energy is reported.
+
+    Example:
+        >>> @law
+        ... def repel(r: float, stiffness: float):
+        ...     return stiffness * (1.0 - r)
+        >>> PairForce(repel, cutoff=1.0, stiffness=10.0).cutoff
+        1.0
+    """
+
+    def __init__(self, law: Any, group: Any = None, *, cutoff: float | None, **parameters: Any):
+        super().__init__(None, as_law(law), group, cutoff, parameters)
+
+
+def as_law(value: Any) -> Law:
+    """A law, or a plain function made one."""
+    return make_law(value)
+
+
+def structure_of(name: str, fields: dict[str, wp.array]) -> Any:
+    """The struct type that holds these arrays, the same one for the same types."""
+    key = (name, tuple((field, array.dtype) for field, array in fields.items()))
+    if key not in _STRUCTS:
+        _STRUCTS[key] = structure(
+            name, {field: wp.array(dtype=array.dtype) for field, array in fields.items()}
+        )
+    return _STRUCTS[key]
+
+
+_STRUCTS: dict[tuple[Any, ...], Any] = {}
+
+
+def filled(kind: Any, fields: dict[str, wp.array]) -> Any:
+    """An instance of a struct with its arrays set."""
+    result = kind()
+    for name, array in fields.items():
+        setattr(result, name, array)
+    return result

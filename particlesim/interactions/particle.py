@@ -1,0 +1,197 @@
+"""Forces on each particle by itself: laws of position, velocity, time and attributes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from .. import validate
+from ..kernels import particle as kernels
+from ..launch import launch
+from ..law import Law, law
+from .base import Arguments, Interaction
+from .pair import as_law, filled, structure_of
+
+if TYPE_CHECKING:
+    from ..model import Model
+    from ..neighbors import Neighbors
+    from ..state import State
+
+
+class ParticleForce(Interaction):
+    """Force on each particle by a law of its own state.
+
+    Args:
+        law: Returns the force, ``wp.vec3``. Its parameters are, by name, the particle's
+            ``position``, ``velocity``, ``mass``, ``radius`` or an attribute given to
+            ``add_particles``; ``time`` [time]; or values given here.
+        group: Which particles feel it; None: all.
+        potential: Law of the potential energy, a float, of the same parameters; None: none is
+            reported.
+        **parameters: Numbers or 3-vectors for the laws' other parameters.
+
+    Example:
+        >>> import warp as wp
+        >>> @law
+        ... def trap(position: wp.vec3, stiffness: float):
+        ...     return -stiffness * position
+        >>> ParticleForce(trap, stiffness=2.0).parameters
+        {'stiffness': 2.0}
+    """
+
+    def __init__(
+        self, law: Any, group: Any = None, *, potential: Any = None, **parameters: Any
+    ) -> None:
+        self.law, self.group = as_law(law), group
+        self.potential = None if potential is None else as_law(potential)
+        laws = [self.law] if self.potential is None else [self.law, self.potential]
+        taken = {name for each in laws for name in each.parameters}
+        validate.known(self.name, parameters, taken, f"parameter of {self.law.name}")
+        self.arguments = [self._arguments(each, parameters) for each in laws]
+        self.parameters: dict[str, Any] = {}
+        self.quantities: set[str] = set()
+        timed = False
+        for each in self.arguments:
+            self.parameters |= each.values
+            self.quantities |= each.quantities
+            timed |= ("extra", "time") in each.sources
+        self.requires = frozenset({"force"} | self.quantities | ({"time"} if timed else set()))
+
+    def _arguments(self, each: Law, given: dict[str, Any]) -> Arguments:
+        own = {name: value for name, value in given.items() if name in each.parameters}
+        return Arguments(self.name, each, 0, own, ("",), extra=("time",))
+
+    def kind(self) -> tuple[Any, ...]:
+        return (type(self), self.law.func, self.potential and self.potential.func,
+                tuple(self.parameters))  # fmt: skip
+
+    def prepare(self, model: Model, neighbors: Neighbors) -> None:
+        self.model = model
+        for each in self.arguments:
+            each.check(model.attributes)
+        members = model.members([peer.group for peer in self.peers], self.name)
+        self.count = len(members)
+        self.members = model.array(members, wp.int32)
+        self.world = model.array(model.world_of[members], wp.int32)
+        # A struct needs a field; the count does no harm.
+        columns = self.columns(self.parameters) or {"none": np.zeros(model.world_count)}
+        self.Params, self.params = model.parameters("ParticleParameters", columns)
+
+    def attach(self, model: Model, state: State) -> None:
+        fields = {"x": state.position}
+        fields |= {name: state[name] for name in sorted(self.quantities - {"position"})}
+        if "time" in self.requires:
+            fields["time"] = state.time
+        self.Data = structure_of("ParticleData", fields)
+        self.data = filled(self.Data, fields)
+        self.kernel = kernels.force_kernel(
+            self.law.function(model.precision), tuple(self._source(self.arguments[0])),
+            model.precision, self.Data, self.Params,
+        )  # fmt: skip
+
+    def _source(self, arguments: Arguments) -> list[str]:
+        return arguments.source({"": "i"}, {"time": "real(d.time[w])"})
+
+    def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        inputs = [self.members, self.world, self.params, self.data, state.force]
+        launch(self.kernel, self.count, inputs, self.model.device)
+
+    def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
+        if self.potential is None:
+            return
+        kernel = kernels.energy_kernel(
+            self.potential.function(self.model.precision),
+            tuple(self._source(self.arguments[1])),
+            self.model.precision, self.Data, self.Params,
+        )  # fmt: skip
+        inputs = [self.members, self.world, self.params, self.data, energy]
+        launch(kernel, self.count, inputs, self.model.device)
+
+
+@law
+def _weight(mass: float, acceleration: wp.vec3):
+    return mass * acceleration
+
+
+@law
+def _height_energy(position: wp.vec3, mass: float, acceleration: wp.vec3):
+    return -mass * wp.dot(acceleration, position)
+
+
+class UniformGravity(ParticleForce):
+    """f = m g, with potential energy -m g.x.
+
+    Args:
+        acceleration: g [length/time^2], (3,).
+        group: Which particles feel it; None: all.
+
+    Example:
+        >>> UniformGravity((0, -9.81, 0)).parameters["acceleration"].tolist()
+        [0.0, -9.81, 0.0]
+    """
+
+    def __init__(self, acceleration: Sequence[float] = (0.0, -9.81, 0.0), group: Any = None):
+        g = validate.vector(self.name, "acceleration", acceleration, unit="length/time^2")
+        super().__init__(_weight, group, potential=_height_energy, acceleration=g)
+
+
+@law
+def _constant(force: wp.vec3):
+    return force
+
+
+@law
+def _constant_energy(position: wp.vec3, force: wp.vec3):
+    return -wp.dot(force, position)
+
+
+class ConstantForce(ParticleForce):
+    """The same force on every particle, f = F, with potential energy -F.x.
+
+    Args:
+        force: F [force], (3,).
+        group: Which particles feel it; None: all.
+    """
+
+    def __init__(self, force: Sequence[float], group: Any = None):
+        value = validate.vector(self.name, "force", force, unit="force")
+        super().__init__(_constant, group, potential=_constant_energy, force=value)
+
+
+@law
+def _drag(velocity: wp.vec3, linear: float, quadratic: float, flow: wp.vec3):
+    relative = velocity - flow
+    return -(linear + quadratic * wp.length(relative)) * relative
+
+
+class Drag(ParticleForce):
+    """f = -(a + b |u|) u, with u the velocity relative to a flow.
+
+    Linear drag is Stokes' law with a = 6 pi mu R; quadratic with b = C rho A / 2.
+
+    Args:
+        linear: a [mass/time], at least 0.
+        quadratic: b [mass/length], at least 0.
+        flow: Velocity of the surrounding medium [length/time], (3,).
+        group: Which particles feel it; None: all.
+    """
+
+    def __init__(
+        self,
+        linear: float = 0.0,
+        quadratic: float = 0.0,
+        flow: Sequence[float] = (0.0, 0.0, 0.0),
+        group: Any = None,
+    ):
+        super().__init__(
+            _drag,
+            group,
+            linear=validate.number(self.name, "linear", linear, minimum=0.0, unit="mass/time"),
+            quadratic=validate.number(
+                self.name, "quadratic", quadratic, minimum=0.0, unit="mass/length"
+            ),
+            flow=validate.vector(self.name, "flow", flow, unit="length/time"),
+        )

@@ -1,0 +1,97 @@
+"""Damped springs between given pairs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from .. import topology
+from ..kernels import bonded as kernels
+from ..launch import launch
+from .base import Interaction
+
+if TYPE_CHECKING:
+    from ..model import Model
+    from ..neighbors import Neighbors
+    from ..state import State
+
+
+class Springs(Interaction):
+    """f_i = -(k (r - L) + c dr/dt) n_ij: linear springs with damping along the spring.
+
+    Args:
+        pairs: (m, 2) indices of the ends.
+        stiffness: k [force/length], one or (m,), at least 0.
+        rest_length: L [length], one or (m,); None: the distances at the start.
+        damping: c [force time/length], one or (m,), at least 0.
+
+    Raises:
+        ValueError: Wrong shapes, ends that are the same, negative values.
+
+    Example:
+        >>> Springs([(0, 1), (1, 2)], stiffness=100.0, rest_length=1.0).pairs.shape
+        (2, 2)
+    """
+
+    requires = frozenset({"force"})
+
+    def __init__(
+        self, pairs: Any, stiffness: Any, rest_length: Any = None, damping: Any = 0.0
+    ) -> None:
+        self.pairs = topology.tuples(self.name, "pairs", pairs, 2)
+        count = len(self.pairs)
+        self.stiffness = topology.per_item(self.name, "stiffness", stiffness, count, minimum=0)
+        self.damping = topology.per_item(self.name, "damping", damping, count, minimum=0)
+        self.rest_length = (
+            None
+            if rest_length is None
+            else topology.per_item(self.name, "rest_length", rest_length, count, minimum=0)
+        )
+
+    def links(self) -> np.ndarray:
+        """Pairs to draw, (m, 2) indices in the scene."""
+        return self.pairs
+
+    def prepare(self, model: Model, neighbors: Neighbors) -> None:
+        self.model = model
+        pairs = topology.merged(self.name, "pairs", model, [peer.pairs for peer in self.peers])
+        lengths = [peer._lengths(model, w) for w, peer in enumerate(self.peers)]
+        columns = {
+            "stiffness": np.concatenate([peer.stiffness for peer in self.peers]),
+            "rest_length": np.concatenate(lengths),
+            "damping": np.concatenate([peer.damping for peer in self.peers]),
+        }
+        rows = topology.incidence(pairs)
+        self.count = len(rows["particle"])
+        if not self.count:
+            return
+        self.springs = model.structures(kernels.spring_type(model.precision), columns)
+        self.bonds = kernels.Incidence()
+        for name, column in rows.items():
+            setattr(self.bonds, name, model.array(column, wp.int32))
+        self.bonds.world = model.array(model.world_of[rows["particle"]], wp.int32)
+
+    def _lengths(self, model: Model, w: int) -> np.ndarray:
+        if self.rest_length is not None:
+            return self.rest_length
+        scene = model.scenes[w]
+        d = scene.position[self.pairs[:, 1]] - scene.position[self.pairs[:, 0]]
+        length = model.box_length[w]
+        wrapped = np.divide(d, length, out=np.zeros_like(d), where=length > 0)
+        return np.linalg.norm(d - length * np.round(wrapped), axis=1)
+
+    def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        force, _ = kernels.spring_kernels(self.model.precision, self.model.periodic)
+        inputs = [
+            self.bonds, self.springs, self.model.box, state.position, state.velocity, state.force
+        ] if self.count else []  # fmt: skip
+        launch(force, self.count, inputs, self.model.device)
+
+    def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
+        if not self.count:
+            return
+        _, measure = kernels.spring_kernels(self.model.precision, self.model.periodic)
+        inputs = [self.bonds, self.springs, self.model.box, state.position, energy, virial]
+        launch(measure, self.count, inputs, self.model.device)

@@ -1,0 +1,52 @@
+"""Snapshot: a frame's start on the device, to go back to when the frame must be done again."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import warp as wp
+
+from .launch import call
+
+if TYPE_CHECKING:
+    from .simulation import Simulation
+
+# Made anew in every substep, or never changed: nothing to keep.
+TRANSIENT = frozenset(
+    {"mass", "inverse_mass", "radius", "world", "correction", "previous_position", "density",
+     "pressure"}
+)  # fmt: skip
+
+
+class Snapshot:
+    """Copies of what a substep starts from."""
+
+    def __init__(self, sim: Simulation):
+        self.sim = sim
+        model, state = sim.model, sim.state
+        skip = TRANSIENT | set(model.attributes) - {"position", "velocity"}
+        if not sim.integrator.carries_forces:
+            skip |= {"force"}
+        self.arrays: dict[str, wp.array] = {
+            name: array for name, array in state.arrays.items() if name not in skip
+        }
+        for k, each in enumerate(sim.neighbors.verlet):
+            self.arrays[f"neighbors_{k}"] = each.x_listed
+        for k, constraint in enumerate(sim.constraints):
+            for name, array in constraint.persistent().items():
+                self.arrays[f"constraint_{k}_{name}"] = array
+        self.copies = {name: wp.clone(array) for name, array in self.arrays.items()}
+
+    def take(self) -> None:
+        """Copy the present; recorded as part of the frame."""
+        for name, array in self.arrays.items():
+            copy = self.copies[name]
+            call(lambda copy=copy, array=array: wp.copy(copy, array))  # type: ignore[misc]
+
+    def restore(self) -> None:
+        """Go back; neighbour rows are made again from the positions that they were made from."""
+        for name, array in self.arrays.items():
+            wp.copy(array, self.copies[name])
+        for each in self.sim.neighbors.verlet:
+            each.mark_all()
+            each.rebuild()

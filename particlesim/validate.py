@@ -1,0 +1,134 @@
+"""Checks of arguments, with errors in one form.
+
+``<Class>: <argument> must <condition> [unit], got <value>; <what to do>.``
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+
+def fail(owner: str, argument: str, condition: str, value: Any, remedy: str) -> ValueError:
+    """The error of the house form, for the caller to raise."""
+    text = np.array2string(value, threshold=6) if isinstance(value, np.ndarray) else repr(value)
+    text = text if len(text) <= 80 else text[:77] + "..."
+    return ValueError(f"{owner}: {argument} must {condition}, got {text}; {remedy}.")
+
+
+def number(
+    owner: str,
+    argument: str,
+    value: Any,
+    *,
+    minimum: float | None = None,
+    above: float | None = None,
+    maximum: float | None = None,
+    unit: str = "",
+    infinite: bool = False,
+) -> float:
+    """``value`` as a finite float within bounds."""
+    suffix = f" [{unit}]" if unit else ""
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise fail(owner, argument, f"be a number{suffix}", value, "give one number") from None
+    if np.isnan(result) or (np.isinf(result) and not infinite):
+        raise fail(owner, argument, f"be finite{suffix}", result, "look for what made it so")
+    if minimum is not None and result < minimum:
+        raise fail(owner, argument, f"be at least {minimum:g}{suffix}", result, "give a larger one")
+    if above is not None and result <= above:
+        raise fail(owner, argument, f"be above {above:g}{suffix}", result, "give a larger one")
+    if maximum is not None and result > maximum:
+        raise fail(owner, argument, f"be at most {maximum:g}{suffix}", result, "give a smaller one")
+    return result
+
+
+def whole(owner: str, argument: str, value: Any, *, minimum: int = 0) -> int:
+    """``value`` as an int of at least ``minimum``."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < minimum:
+        raise fail(
+            owner, argument, f"be a whole number of at least {minimum}", value, "give one such"
+        )
+    return int(value)
+
+
+def vector(owner: str, argument: str, value: Any, *, unit: str = "") -> np.ndarray:
+    """``value`` as three finite floats."""
+    suffix = f" [{unit}]" if unit else ""
+    result = _array(owner, argument, value)
+    if result.shape != (3,):
+        raise fail(owner, argument, f"have shape (3,){suffix}", value, "give three numbers")
+    _finite(owner, argument, result)
+    return result
+
+
+def rows(
+    owner: str, argument: str, value: Any, count: int | None, width: int | None
+) -> np.ndarray:
+    """``value`` as a finite (count, width) or, for width None, (count,) array; broadcast to it."""
+    result = _array(owner, argument, value)
+    if count is None:
+        if result.ndim != 2 or result.shape[1] != width:
+            if result.size == 0:
+                return np.zeros((0, width or 1))
+            raise fail(owner, argument, f"have shape (n, {width})", result, "give one row a particle")
+    else:
+        shape: tuple[int, ...] = (count,) if width is None else (count, width)
+        try:
+            result = np.broadcast_to(result, shape).copy()
+        except ValueError:
+            raise fail(
+                owner,
+                argument,
+                f"have shape {shape[1:] or '()'} or {shape}",
+                np.shape(value),
+                "give one value for all, or one a particle",
+            ) from None
+    _finite(owner, argument, result)
+    return result
+
+
+def _array(owner: str, argument: str, value: Any) -> np.ndarray:
+    if hasattr(value, "numpy"):
+        value = value.numpy()
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise fail(owner, argument, "be numbers", value, "give an array of floats") from None
+
+
+def _finite(owner: str, argument: str, array: np.ndarray) -> None:
+    bad = ~np.isfinite(array)
+    if bad.any():
+        at = tuple(int(k) for k in np.argwhere(bad)[0])
+        where = f"{argument}[{', '.join(map(str, at))}]" if at else argument
+        raise fail(owner, where, "be finite", float(array[at]), "look for what made it so")
+
+
+def choice(owner: str, argument: str, value: Any, allowed: Iterable[str]) -> str:
+    """``value`` if it is one of ``allowed``."""
+    names = list(allowed)
+    if value not in names:
+        raise fail(owner, argument, f"be one of {', '.join(names)}", value, suggest(value, names))
+    return value
+
+
+def known(owner: str, given: Iterable[str], names: Iterable[str], what: str = "argument") -> None:
+    """Refuse keywords that are not among ``names``, and list those that are."""
+    names = list(names)
+    for name in given:
+        if name not in names:
+            allowed = ", ".join(names) or "(none)"
+            raise TypeError(
+                f"{owner}: {what} must be one of {allowed}, got {name!r}; {suggest(name, names)}."
+            )
+
+
+def suggest(value: Any, names: list[str]) -> str:
+    """What was probably meant."""
+    close = difflib.get_close_matches(str(value), names, n=1)
+    return f"did you mean {close[0]!r}" if close else "choose one of these"
