@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 import warp as wp
+from warp._src.codegen import Struct
 
 # Generic names that a law may use, and what they become in float64.
 _DOUBLE = {
@@ -114,8 +115,8 @@ def translate(
         name: annotation(parameter.annotation, precision)
         for name, parameter in inspect.signature(func, eval_str=True).parameters.items()
     }
-    closure = repr([getattr(c.cell_contents, "name", c.cell_contents) for c in copy.__closure__ or ()])
-    digest = hashlib.sha256((source + closure + precision.name).encode()).hexdigest()[:12]
+    cells = [c.cell_contents for c in copy.__closure__ or ()]
+    digest = _digest(source, precision.name, *cells, *used.values())
     return wp.Function(
         copy,
         key=func.__name__,
@@ -136,6 +137,21 @@ def _without_decorators(source: str) -> str:
     return ast.unparse(tree)
 
 
+def _digest(*parts: Any) -> str:
+    """Hash of values by what they are, the same in every process."""
+
+    def text(value: Any) -> str:
+        if isinstance(value, wp.Function):
+            return value.native_func
+        if isinstance(value, Struct):
+            return value.key + value.hash.hex()
+        if isinstance(value, wp.array):
+            return f"array{value.ndim} of {text(value.dtype)}"
+        return str(getattr(value, "__qualname__", value))
+
+    return hashlib.sha256("|".join(map(text, parts)).encode()).hexdigest()[:12]
+
+
 def function(func: Callable[..., Any]) -> wp.Function:
     """Register ``func``, annotated with Warp types, under a native name that repeats in every run.
 
@@ -144,9 +160,7 @@ def function(func: Callable[..., Any]) -> wp.Function:
     the source and the closure, by the native names of the functions in it.
     """
     cells = [c.cell_contents for c in func.__closure__ or ()]
-    parts = [getattr(c, "native_func", None) or repr(c) for c in cells]
-    text = inspect.getsource(func) + "|".join(parts) + repr(func.__annotations__)
-    digest = hashlib.sha256(text.encode()).hexdigest()[:12]
+    digest = _digest(inspect.getsource(func), *cells, *func.__annotations__.values())
     return wp.Function(
         func,
         key=func.__name__,
@@ -162,7 +176,7 @@ def native(stub: Callable[..., Any], snippet: str, after_gradients: bool = True)
     ``after_gradients`` has Warp emit it together with the functions that use ``wp.grad``, behind
     the adjoints that those call, so that the snippet may call a derived law by name.
     """
-    digest = hashlib.sha256((snippet + repr(stub.__annotations__)).encode()).hexdigest()[:12]
+    digest = _digest(snippet, *stub.__annotations__.values())
     result = wp.Function(
         stub,
         key=stub.__name__,
@@ -197,8 +211,7 @@ def structure(name: str, fields: dict[str, Any]) -> Any:
 def function_from_source(source: str, namespace: dict[str, Any]) -> wp.Function:
     """Make a Warp function of generated source; ``namespace`` holds the names it refers to."""
     name = re.search(r"def (\w+)\(", source).group(1)
-    parts = [f"{k}={getattr(v, 'native_func', None) or repr(v)}" for k, v in namespace.items()]
-    digest = hashlib.sha256((source + "|".join(parts)).encode()).hexdigest()[:12]
+    digest = _digest(source, *namespace.keys(), *namespace.values())
     filename = f"<particlesim {name} {digest}>"
     scope = dict(namespace)
     exec(compile(source, filename, "exec"), scope)

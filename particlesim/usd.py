@@ -199,7 +199,7 @@ class StageInfo:
     frame_time: float | None = None
     up_axis: str = "y"
     meters_per_unit: float = 1.0
-    periodic: tuple[Any, Any] | None = None
+    periodic: Any = None
 
     def __post_init__(self) -> None:
         owner = "StageInfo"
@@ -215,8 +215,8 @@ class StageInfo:
         if not self.points:
             raise validate.fail(owner, "points", "hold a group", self.points, "give a PointsPrim")
         if self.periodic is not None:
-            corners = tuple(np.array(corner, dtype=np.float64) for corner in self.periodic)
-            if len(corners) != 2 or any(corner.shape != (3,) for corner in corners):
+            corners = np.array(self.periodic, dtype=np.float64)
+            if corners.shape != (2, 3):
                 raise validate.fail(
                     owner, "periodic", "be (lower, upper), three each", self.periodic, "give both"
                 )
@@ -224,7 +224,8 @@ class StageInfo:
                 raise validate.fail(
                     owner, "periodic", "have upper above lower", self.periodic, "swap them"
                 )
-            _replace(self, "periodic", corners)
+            both = np.isfinite(corners).all(axis=0)
+            _replace(self, "periodic", np.where(both, corners, np.nan))
 
     @property
     def velocity_scale(self) -> float:

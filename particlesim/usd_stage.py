@@ -146,7 +146,7 @@ def _segments(prim: LinksPrim, info: StageInfo, x: np.ndarray) -> np.ndarray:
     ends = x[prim.pairs]
     if info.periodic is not None:
         size = info.periodic[1] - info.periodic[0]
-        around = np.isfinite(size)
+        around = ~np.isnan(size)
         apart = (ends[:, 1] - ends[:, 0])[:, around]
         ends[:, 1, around] -= np.round(apart / size[around]) * size[around]
     return ends.reshape(-1, 3)
@@ -184,8 +184,9 @@ def author_root(paths: Layout, info: StageInfo, fields: dict[str, int], x: np.nd
         for shape, path in zip(info.shapes, paths.shapes, strict=True):
             root.shape(shape, path)
         if info.periodic is not None:
-            open_box = np.where(np.isfinite(info.periodic), info.periodic, root.box)
-            root.outline(WORLD.AppendChild("periodic_box"), open_box, (0.5, 0.5, 0.5))
+            # On an open axis the outline is as long as what there is to see.
+            box = np.where(np.isnan(info.periodic), root.box, info.periodic)
+            root.outline(WORLD.AppendChild("periodic_box"), box, (0.5, 0.5, 0.5))
         root.camera()
         root.lights()
     return layer
@@ -394,6 +395,8 @@ def _bounds(info: StageInfo, x: np.ndarray) -> np.ndarray:
             boxes.append(np.array([first, second]))
         elif shape.kind == "sphere":
             boxes.append(np.array([first - second, first + second]))
+    if info.periodic is not None:
+        boxes.append(np.where(np.isnan(info.periodic), boxes[0], info.periodic))
     lower, upper = np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))
     center, diagonal = 0.5 * (lower + upper), np.linalg.norm(upper - lower)
     for shape in info.shapes:
