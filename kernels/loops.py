@@ -10,6 +10,7 @@ reassociates the sum lets the compiler use the vector units (Warp's own loops ne
 :func:`plain_loop`, the reference, for CUDA.
 """
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -84,6 +85,24 @@ def minimum_image(precision: Precision, periodic: Periodicity) -> wp.Function:
         return result
 
     return function(nearest_image)
+
+
+@functools.cache
+def row_reader(precision: Precision, width: int) -> wp.Function:
+    """``row(array, j)`` reads a vector by its components, from an array without gaps.
+
+    Warp loads a vector as a whole, which keeps the compiler from vectorising the loop around it.
+    """
+    vec, real = precision.vector(width), precision.c
+    components = ", ".join(f"data[{width} * (long long)j + {c}]" for c in range(width))
+    snippet = f"""
+    const {real}* data = (const {real}*)array.data;
+    return wp::vec_t<{width},{real}>({components});
+"""
+
+    def row(array: wp.array(dtype=vec), j: int) -> vec: ...
+
+    return native(row, snippet, after_gradients=False)
 
 
 def plain_loop(

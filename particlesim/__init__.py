@@ -3,6 +3,8 @@
 from . import sample
 from .errors import SimulationError
 from .interactions import (
+    SPH,
+    ArtificialViscosity,
     ConstantForce,
     Drag,
     Gravity,
@@ -11,7 +13,9 @@ from .interactions import (
     PairForce,
     PairPotential,
     ParticleForce,
+    Polytrope,
     Springs,
+    Tait,
     UniformGravity,
 )
 from .law import Law, law
@@ -22,6 +26,8 @@ from .simulation import Simulation
 __version__ = "0.1.0"
 
 __all__ = [
+    "SPH",
+    "ArtificialViscosity",
     "ConstantForce",
     "Drag",
     "Gravity",
@@ -32,11 +38,13 @@ __all__ = [
     "PairForce",
     "PairPotential",
     "ParticleForce",
+    "Polytrope",
     "Scene",
     "Settings",
     "Simulation",
     "SimulationError",
     "Springs",
+    "Tait",
     "UniformGravity",
     "law",
     "sample",

@@ -146,7 +146,7 @@ class VerletList(AllPairs):
         self.planes = wp.zeros((3, self.count + kernels.BLOCK), dtype=real, device=device)
         start = state["position"].numpy()[self.members_host].astype(np.float64)
         for w in self.grid_worlds:
-            self.grids[w] = self._grid(w, start[self.begin_host[w] : self.end_host[w]])
+            self.grids[w] = self.grid_over(w, start[self.begin_host[w] : self.end_host[w]])
         self._resize(32)
         self.mark_all()
         self.update(state)
@@ -163,7 +163,7 @@ class VerletList(AllPairs):
                         float(length), "enlarge the box or shorten the cutoff",
                     )  # fmt: skip
 
-    def _grid(self, w: int, x: np.ndarray) -> tuple[wp.HashGrid, Any]:
+    def grid_over(self, w: int, x: np.ndarray) -> tuple[wp.HashGrid, Any]:
         """A hash grid sized to world w, and its cell coordinates."""
         model, reach = self.model, max(float(self.reach[w]), 1e-30)
         lower, upper = x.min(axis=0), x.max(axis=0)
@@ -284,15 +284,21 @@ class VerletList(AllPairs):
             model.device,
         )  # fmt: skip
 
-    def grow(self) -> bool:
-        """If a row was full: make all rows longer, and again from the same positions."""
+    def lengthen(self) -> bool:
+        """If a row was full: make room for as many as were found. The rows are then empty."""
         if not self.overflow.numpy()[0]:
             return False
         self._resize(int(1.25 * self.pairs.count.numpy().max()) + 8)
         self.overflow.zero_()
-        self.mark_all()
-        self.rebuild()
         return True
+
+    def grow(self) -> bool:
+        """If a row was full: make all rows longer, and again from the same positions."""
+        grown = self.lengthen()
+        if grown:
+            self.mark_all()
+            self.rebuild()
+        return grown
 
     def describe(self) -> str:
         grids = [f"{g._dim_x} x {g._dim_y} x {g._dim_z}" for g, _ in self.grids.values()]
@@ -394,6 +400,11 @@ class Neighbors:
     def overflowing(self) -> bool:
         """Some row was full."""
         return any(each.overflow.numpy()[0] for each in self.verlet)
+
+    def lengthen(self) -> None:
+        """Make room in the rows that were full; whoever calls has them made again."""
+        for each in self.verlet:
+            each.lengthen()
 
     def grow(self) -> bool:
         """Lengthen the rows that were full; True if some were and the step must be redone."""

@@ -208,8 +208,8 @@ class Simulation:
 
     def _redo_with_longer_rows(self) -> None:
         """Nothing is ever left out of a full row: back to the start of the frame, and again."""
+        self.neighbors.lengthen()
         self.snapshot.restore()
-        self.neighbors.grow()
         self.close()
         self.executor.run()
 

@@ -9,8 +9,7 @@
     /World/env_0000/boundaries/<name>  Mesh; for a box, faces and edges below
 
 Values that change are declared in the root without a default, for a default would hide the clips.
-Layers are authored by Sdf in change blocks, so that thousands of worlds take no longer than their
-data.
+Layers are authored by Sdf in change blocks, for a stage would recompose itself at every value.
 """
 
 from __future__ import annotations

@@ -1,0 +1,79 @@
+"""Viscosities of SPH: what is added to the pressure of a pair because it moves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import warp as wp
+
+from .. import validate
+from ..law import Law, law
+
+
+# What a viscosity may name of a pair, beside smoothing_length and its own parameters.
+PAIR_VARIABLES = ("approach", "distance_squared", "density", "sound_speed")
+
+
+class Viscosity:
+    """Base of viscosities that act along the pair, as a term Pi_ij beside P/rho^2.
+
+    A member gives one law, ``term``: Pi_ij [length^5 / (mass time^2)] of what it names of
+
+    - ``approach``: v_ij . x_ij, negative where the pair approaches [length^2/time];
+    - ``distance_squared``: r^2 [length^2];
+    - ``smoothing_length``: h [length];
+    - ``density`` and ``sound_speed``: means of the pair;
+    - the member's own ``parameters``.
+
+    It must not branch (``wp.where``, ``wp.min``), so that the loop over neighbours vectorises.
+    """
+
+    term: Law
+    parameters: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """What reports and errors call it."""
+        return type(self).__name__
+
+    @property
+    def laws(self) -> tuple[Law, ...]:
+        """All laws of the member."""
+        return (self.term,)
+
+
+@law
+def artificial_viscosity(
+    approach: float, distance_squared: float, smoothing_length: float, density: float,
+    sound_speed: float, alpha: float, beta: float,
+):  # fmt: skip
+    h = smoothing_length
+    mu = h * wp.min(approach, 0.0) / (distance_squared + 0.01 * h * h)
+    return (beta * mu - alpha * sound_speed) * mu / density
+
+
+class ArtificialViscosity(Viscosity):
+    """Pi_ij = (-alpha c mu + beta mu^2) / rho, mu = h v_ij.x_ij / (r^2 + 0.01 h^2), if v_ij.x_ij < 0.
+
+    With the means of c and rho over the pair; pairs that recede feel nothing (Monaghan 1992,
+    eq. 4.2). It conserves momentum and angular momentum and turns kinetic energy into heat that
+    nobody keeps. In smooth flow it is about a kinematic viscosity of alpha c h / 10 in three
+    dimensions, alpha c h / 8 in two (Monaghan 2005, sec. 8.2, halved as receding pairs feel none).
+
+    Args:
+        alpha: Strength of the part linear in the speed, at least 0.
+        beta: Strength of the quadratic part, which keeps fast streams from passing through
+            each other, at least 0; 2 alpha is usual for shocks.
+
+    Example:
+        >>> ArtificialViscosity(0.05).parameters
+        {'alpha': 0.05, 'beta': 0.0}
+    """
+
+    term = artificial_viscosity
+
+    def __init__(self, alpha: float, beta: float = 0.0) -> None:
+        self.parameters = {
+            "alpha": validate.number(self.name, "alpha", alpha, minimum=0.0),
+            "beta": validate.number(self.name, "beta", beta, minimum=0.0),
+        }

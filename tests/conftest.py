@@ -1,0 +1,39 @@
+"""Fixtures shared by all tests."""
+
+import pytest
+import warp as wp
+
+import particlesim as ps
+
+wp.init()
+DEVICES = ["cpu", *(["cuda:0"] if wp.is_cuda_available() else [])]
+
+
+@pytest.fixture(params=DEVICES)
+def device(request):
+    """Every device there is: the CPU, and CUDA where present."""
+    return request.param
+
+
+@pytest.fixture(params=["float32", "float64"])
+def precision(request):
+    """Both precisions."""
+    return request.param
+
+
+@pytest.fixture
+def liquid():
+    """A function that makes a Lennard-Jones liquid of 4 n^3 atoms, as a scene."""
+
+    def build(cells=4, density=0.8442, temperature=1.44, seed=0, **options):
+        count = 4 * cells**3
+        side = (count / density) ** (1 / 3)
+        scene = ps.Scene(periodic=((0, 0, 0), (side, side, side)))
+        scene.add_particles(
+            ps.sample.lattice("fcc", (cells, cells, cells), side / cells),
+            velocity=ps.sample.maxwell_boltzmann(count, temperature, 1.0, seed=seed),
+        )
+        scene.add_interaction(ps.LennardJones(**{"cutoff": 2.5, **options}))
+        return scene
+
+    return build
