@@ -19,6 +19,7 @@ from .interactions import (
     UniformGravity,
 )
 from .law import Law, law
+from .record import UsdRecorder
 from .scene import Group, Scene
 from .settings import Settings
 from .simulation import Simulation
@@ -46,6 +47,7 @@ __all__ = [
     "Springs",
     "Tait",
     "UniformGravity",
+    "UsdRecorder",
     "law",
     "sample",
 ]

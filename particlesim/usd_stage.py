@@ -22,7 +22,7 @@ import numpy as np
 from pxr import Gf, Sdf, Tf, Vt
 
 if TYPE_CHECKING:
-    from .usd import Color, LinksPrim, PointsPrim, Shape, StageInfo
+    from .usd_info import Color, LinksPrim, PointsPrim, Shape, StageInfo
 
 Types = Sdf.ValueTypeNames
 WORLD = Sdf.Path("/World")

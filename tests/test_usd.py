@@ -14,7 +14,8 @@ import pytest
 import warp as wp
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdValidation, Vt
 
-from particlesim.usd import LinksPrim, PointsPrim, Shape, StageInfo, UsdRecorder
+from particlesim.usd import UsdWriter
+from particlesim.usd_info import LinksPrim, PointsPrim, Shape, StageInfo
 
 BLUE, RED = (0.2, 0.5, 0.9), (0.9, 0.2, 0.1)
 # Blender drops, without a word, every primvar after one of another type.
@@ -44,7 +45,7 @@ def motion(frames: int, count: int = COUNT) -> tuple[np.ndarray, np.ndarray]:
 def record(path: Path, info: StageInfo, frames: int = 3, count: int = COUNT, **options):
     """A recording of ``motion`` and how it was made."""
     position, velocity = motion(frames, count)
-    with UsdRecorder(path, info, **options) as recorder:
+    with UsdWriter(path, info, **options) as recorder:
         for frame in range(frames):
             recorder.write(frame, position[frame], velocity[frame])
     return position, velocity
@@ -161,7 +162,7 @@ def test_velocity_of_playback_lands_on_the_next_frame(tmp_path):
     path, dt = tmp_path / "out.usda", 0.01
     info = StageInfo(points=[group()], frames=2, fps=24, frame_time=dt)
     position, velocity = motion(1)
-    with UsdRecorder(path, info) as recorder:
+    with UsdWriter(path, info) as recorder:
         recorder.write(0, position[0], velocity[0])
         recorder.write(1, position[0] + dt * velocity[0], velocity[0])
     stage = opened(path)
@@ -270,7 +271,7 @@ def test_links_take_the_short_way_in_a_periodic_box(tmp_path):
         links=[LinksPrim(0, "bond", np.array([[0, 1]]), 0.05, RED)],
         periodic=((0, None, 0), (1, None, 1)),
     )
-    with UsdRecorder(path, info) as recorder:
+    with UsdWriter(path, info) as recorder:
         recorder.write(0, position, np.zeros((2, 3)))
     stage = opened(path)
     ends = points_at(stage, "/World/env_0000/bond", 0)
@@ -348,7 +349,7 @@ def test_fields_are_primvars(tmp_path):
     density, field = rng.random((2, COUNT)), rng.random((2, COUNT, 3))
     position, velocity = motion(2)
     fields = {"density": 1, "magnetic field": 3}
-    with UsdRecorder(path, StageInfo(points=[group()], frames=2), fields=fields) as recorder:
+    with UsdWriter(path, StageInfo(points=[group()], frames=2), fields=fields) as recorder:
         for frame in range(2):
             values = {"density": density[frame], "magnetic field": field[frame]}
             recorder.write(frame, position[frame], velocity[frame], values)
@@ -365,7 +366,7 @@ def test_fields_are_primvars(tmp_path):
 def test_warp_arrays_are_taken(tmp_path):
     path = tmp_path / "out.usda"
     position, velocity = motion(1)
-    with UsdRecorder(path, StageInfo(points=[group()])) as recorder:
+    with UsdWriter(path, StageInfo(points=[group()])) as recorder:
         arrays = (wp.array(a[0], dtype=wp.vec3, device="cpu") for a in (position, velocity))
         recorder.write(0, *arrays)
     np.testing.assert_array_equal(points_at(opened(path), "/World/env_0000/water", 0), position[0])
@@ -377,11 +378,11 @@ def test_existing_output_is_refused_and_kept(tmp_path):
     with pytest.raises(
         FileExistsError, match=r"^UsdRecorder: path must be new, .*overwrite=True\.$"
     ):
-        UsdRecorder(path, info)
+        UsdWriter(path, info)
     with pytest.raises(FileExistsError, match="share its frames"):
-        UsdRecorder(tmp_path / "out.usdc", info, overwrite=True)
+        UsdWriter(tmp_path / "out.usdc", info, overwrite=True)
     # Nothing is lost either while a new recording has no frame yet.
-    UsdRecorder(path, info, overwrite=True).close()
+    UsdWriter(path, info, overwrite=True).close()
     np.testing.assert_array_equal(points_at(opened(path), "/World/env_0000/water", 4), position[4])
 
 
@@ -405,15 +406,15 @@ def test_unusable_paths_are_refused(tmp_path):
     with pytest.raises(
         FileNotFoundError, match=r"^UsdRecorder: path must be in an existing folder"
     ):
-        UsdRecorder(tmp_path / "missing" / "out.usda", info)
+        UsdWriter(tmp_path / "missing" / "out.usda", info)
     with pytest.raises(ValueError, match=r"^UsdRecorder: path must end in \.usda, \.usd, \.usdc"):
-        UsdRecorder(tmp_path / "out.abc", info)
+        UsdWriter(tmp_path / "out.abc", info)
 
 
 def test_interrupted_recording_can_be_read(tmp_path):
     path = tmp_path / "out.usda"
     position, velocity = motion(3)
-    recorder = UsdRecorder(path, StageInfo(points=[group()], frames=10))
+    recorder = UsdWriter(path, StageInfo(points=[group()], frames=10))
     for frame in range(3):
         recorder.write(frame, position[frame], velocity[frame])
         # The planned end reaches past the files, which are there as soon as write returns.
@@ -430,7 +431,7 @@ def test_an_exception_leaves_the_frames_so_far(tmp_path):
     position, velocity = motion(2)
     with (
         pytest.raises(KeyboardInterrupt),
-        UsdRecorder(path, StageInfo(points=[group()], frames=10)) as recorder,
+        UsdWriter(path, StageInfo(points=[group()], frames=10)) as recorder,
     ):
         recorder.write(0, position[0], velocity[0])
         recorder.write(1, position[1], velocity[1])
@@ -443,11 +444,12 @@ def test_killed_recording_can_be_read(tmp_path):
     script = """
 import sys
 import numpy as np
-from particlesim.usd import PointsPrim, StageInfo, UsdRecorder
+from particlesim.usd import UsdWriter
+from particlesim.usd_info import PointsPrim, StageInfo
 
 count = 50_000
 drops = PointsPrim(0, "drops", slice(0, count), np.arange(count), 0.1, (1, 1, 1))
-recorder = UsdRecorder(sys.argv[1], StageInfo(points=[drops], frames=10_000))
+recorder = UsdWriter(sys.argv[1], StageInfo(points=[drops], frames=10_000))
 for frame in range(10_000):
     recorder.write(frame, np.full((count, 3), frame), np.zeros((count, 3)))
 """
@@ -478,7 +480,7 @@ def test_values_that_are_not_finite_are_refused(tmp_path, name, bad):
               for p, v in zip(position, velocity, strict=True)]  # fmt: skip
     points = [group(0, 0, 5), group(1, 5, 7, ids=np.arange(10, 17))]
     info = StageInfo(points=points, frames=10)
-    with UsdRecorder(path, info, fields={"density": 1}) as recorder:
+    with UsdWriter(path, info, fields={"density": 1}) as recorder:
 
         def write(frame: int) -> None:
             given = arrays[frame]
@@ -504,7 +506,7 @@ def test_values_that_are_not_finite_are_refused(tmp_path, name, bad):
 def test_nothing_is_created_by_a_first_frame_that_is_refused(tmp_path):
     with (
         pytest.raises(ValueError, match=r"position of particle 0 .* at frame 0"),
-        UsdRecorder(tmp_path / "out.usda", StageInfo(points=[group()])) as recorder,
+        UsdWriter(tmp_path / "out.usda", StageInfo(points=[group()])) as recorder,
     ):
         recorder.write(0, np.full((COUNT, 3), np.nan), np.zeros((COUNT, 3)))
     assert list(tmp_path.iterdir()) == []
@@ -523,7 +525,7 @@ def test_nothing_is_created_by_a_first_frame_that_is_refused(tmp_path):
     ],
 )
 def test_arrays_that_do_not_fit_are_refused(tmp_path, arguments, message):
-    recorder = UsdRecorder(tmp_path / "out.usda", StageInfo(points=[group()]))
+    recorder = UsdWriter(tmp_path / "out.usda", StageInfo(points=[group()]))
     with pytest.raises(ValueError, match=message):
         recorder.write(*arguments)
 
@@ -531,7 +533,7 @@ def test_arrays_that_do_not_fit_are_refused(tmp_path, arguments, message):
 def test_frames_come_one_by_one(tmp_path):
     position, velocity = motion(1)
     frame = (position[0], velocity[0])
-    with UsdRecorder(tmp_path / "out.usda", StageInfo(points=[group()], frames=9)) as recorder:
+    with UsdWriter(tmp_path / "out.usda", StageInfo(points=[group()], frames=9)) as recorder:
         recorder.write(4, *frame)
         for number in (3, 4, 6):
             with pytest.raises(ValueError, match=f"frame must be 5, the next, got {number}"):
@@ -546,7 +548,7 @@ def test_frames_come_one_by_one(tmp_path):
 def test_more_frames_than_planned(tmp_path):
     path = tmp_path / "out.usda"
     position, velocity = motion(8)
-    recorder = UsdRecorder(path, StageInfo(points=[group()], frames=2))
+    recorder = UsdWriter(path, StageInfo(points=[group()], frames=2))
     for frame in range(8):
         recorder.write(frame, position[frame], velocity[frame])
     # Readable already before the end is known.
@@ -559,7 +561,7 @@ def test_more_frames_than_planned(tmp_path):
 
 def test_memory_does_not_grow_with_frames(tmp_path):
     position, velocity = motion(1)
-    with UsdRecorder(tmp_path / "out.usda", StageInfo(points=[group()], frames=50)) as recorder:
+    with UsdWriter(tmp_path / "out.usda", StageInfo(points=[group()], frames=50)) as recorder:
         recorder.write(0, position[0], velocity[0])
         layers = len(Sdf.Layer.GetLoadedLayers())
         for frame in range(1, 50):
@@ -576,7 +578,7 @@ def test_a_write_that_fails_loses_no_frame(tmp_path, monkeypatch, error):
     def fail(*_):
         raise error
 
-    with UsdRecorder(path, StageInfo(points=[group()], frames=2)) as recorder:
+    with UsdWriter(path, StageInfo(points=[group()], frames=2)) as recorder:
         recorder.write(0, position[0], velocity[0])
         before = folder_content(tmp_path)
         monkeypatch.setattr(os, "replace", fail)
@@ -630,4 +632,4 @@ def test_descriptions_that_make_no_sense_are_refused(make, message):
 )
 def test_fields_that_readers_would_mistake_are_refused(tmp_path, fields):
     with pytest.raises(ValueError, match=r"^UsdRecorder: fields.* must have .*, got .*; .*\.$"):
-        UsdRecorder(tmp_path / "out.usda", StageInfo(points=[group()]), fields=fields)
+        UsdWriter(tmp_path / "out.usda", StageInfo(points=[group()]), fields=fields)

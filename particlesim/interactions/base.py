@@ -43,6 +43,10 @@ class Bindable:
         """What must agree for scenes to be simulated in one batch."""
         return (type(self),)
 
+    def links(self) -> np.ndarray:
+        """Pairs of particles to draw as lines, (m, 2) indices in the scene."""
+        return np.zeros((0, 2), dtype=np.int64)
+
     def bind(self, peers: Sequence[Any]) -> Any:
         """A copy for one simulation."""
         bound = copy.copy(self)

@@ -18,8 +18,8 @@ import particlesim as ps
 
 SPACING, SIDE = 0.02, 39
 NEIGHBOURS = 30
-# 4/3 pi (2 h)^3 = NEIGHBOURS spacing^3, the particle itself counted.
-SMOOTHING_LENGTH = SPACING * (NEIGHBOURS / (4 / 3 * 3.14159265)) ** (1 / 3) / 2
+
+SMOOTHING_LENGTH = SPACING
 SOUND_SPEED = 35.0  # ten times the speed sqrt(2 g H) / ... of the front, a column 0.78 m high
 STEP = 0.3 * SMOOTHING_LENGTH / SOUND_SPEED
 
