@@ -84,7 +84,7 @@ def spring_kernels(precision: Precision, periodic: Periodicity) -> tuple[wp.Kern
         for e in range(bonds.begin[k], bonds.begin[k + 1]):
             j = bonds.partner[e]
             s = springs[bonds.bond[e]]
-            n, r = direction(image(x[i] - x[j], b), i, j)
+            _n, r = direction(image(x[i] - x[j], b), i, j)
             stretch = r - s.rest_length
             # Half to each end.
             energy_io[i] = energy_io[i] + wp.float64(real(0.25) * s.stiffness * stretch * stretch)

@@ -42,7 +42,6 @@ def integration_kernels(
     """
     vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
     wraps = bool(periodic)
-    on_x, on_y, on_z = (int(axis) for axis in periodic)
 
     def kick(i: int, dt: real, m: Motion):
         v = m.v[i]

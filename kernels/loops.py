@@ -88,21 +88,27 @@ def minimum_image(precision: Precision, periodic: Periodicity) -> wp.Function:
 
 
 @functools.cache
-def row_reader(precision: Precision, width: int) -> wp.Function:
-    """``row(array, j)`` reads a vector by its components, from an array without gaps.
+def reader(precision: Precision, width: int | None = None) -> wp.Function:
+    """``read(array, j)`` of numbers, or of vectors by their components, from an array without gaps.
 
-    Warp loads a vector as a whole, which keeps the compiler from vectorising the loop around it.
+    Warp's own reading computes with strides and loads a vector as a whole; the first slows a
+    vectorised loop, the second keeps the compiler from vectorising it.
     """
-    vec, real = precision.vector(width), precision.c
-    components = ", ".join(f"data[{width} * (long long)j + {c}]" for c in range(width))
+    real = precision.c
+    if width is None:
+        kind, body = precision.scalar, "data[j]"
+    else:
+        kind = precision.vector(width)
+        components = ", ".join(f"data[{width} * (long long)j + {c}]" for c in range(width))
+        body = f"wp::vec_t<{width},{real}>({components})"
     snippet = f"""
     const {real}* data = (const {real}*)array.data;
-    return wp::vec_t<{width},{real}>({components});
+    return {body};
 """
 
-    def row(array: wp.array(dtype=vec), j: int) -> vec: ...
+    def read(array: wp.array(dtype=kind), j: int) -> kind: ...
 
-    return native(row, snippet, after_gradients=False)
+    return native(read, snippet, after_gradients=False)
 
 
 def plain_loop(

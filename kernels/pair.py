@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from .loops import ALL, Pairs, Periodicity, box_type, native_loop, plain_loop
-from .precision import Precision, function_from_source, function, register
+from .precision import Precision, function, function_from_source, register
 
 # A pair closer than p.closest is taken as that far apart, along a fixed direction: coincident
 # particles then push each other apart, equally and opposite.

@@ -16,7 +16,7 @@ from typing import Any
 
 import warp as wp
 
-from .loops import Periodicity, box_type, minimum_image, row_reader
+from .loops import Periodicity, box_type, minimum_image, reader
 from .neighbors import cells_type
 from .precision import Precision, function, function_from_source, register
 
@@ -38,25 +38,33 @@ def bound_law(
 def density_term(weight: wp.Function, precision: Precision, data: Any, params: Any) -> wp.Function:
     """Term m_j w(q), the density without the normalisation of W."""
     real, vec3, one = precision.scalar, precision.vec3, precision.vector(1)
+    read = reader(precision)
 
     def add_density(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
-        return one(d.m[j] * weight(wp.sqrt(r2) * p.inverse_h))
+        return one(read(d.m, j) * weight(wp.sqrt(r2) * p.inverse_h))
 
     return function(add_density)
 
 
 def keep_state(
-    weight: wp.Function, pressure: wp.Function, sound_speed: wp.Function, precision: Precision,
-    data: Any, params: Any, out: Any,
+    weight: wp.Function, pressure: wp.Function, sound_speed: wp.Function | None,
+    precision: Precision, data: Any, params: Any, out: Any,
 ) -> wp.Function:  # fmt: skip
-    """Store: density and pressure of the particle, and (m, rho, P/rho^2, c) in slot order."""
+    """Store: density and pressure of the particle, and (m, rho, P/rho^2, c) in slot order.
+
+    ``sound_speed`` None leaves c at 0.
+    """
     real, one, vec4 = precision.scalar, precision.vector(1), precision.vector(4)
+    sounds = sound_speed is not None
 
     def keep(i: int, particle: int, total: one, d: data, p: params, o: out):
         m = d.m[i]
         rho = p.sigma * (total[0] + m * weight(real(0.0)))  # the sum is over the others
         pressure_i = pressure(rho, p)
-        o.state[i] = vec4(m, rho, pressure_i / (rho * rho), sound_speed(rho, p))
+        c = real(0.0)
+        if wp.static(sounds):
+            c = sound_speed(rho, pressure_i, p)
+        o.state[i] = vec4(m, rho, pressure_i / (rho * rho), c)
         o.rho[particle] = rho
         o.pressure[particle] = pressure_i
 
@@ -74,7 +82,7 @@ def force_term(
     """
     real, vec3 = precision.scalar, precision.vec3
     direction = precision.vec3(*DIRECTIONS[dimension])
-    state_of, velocity_of = row_reader(precision, 4), row_reader(precision, 3)
+    state_of, velocity_of = reader(precision, 4), reader(precision, 3)
     viscous = viscosity is not None
 
     def push(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):

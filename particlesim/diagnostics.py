@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -70,7 +71,7 @@ def measure(sim: Simulation) -> Diagnostics:
 def blocks(offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Begin, end and world of the blocks; they start anew in each world."""
     begin, end, world = [], [], []
-    for w, (start, stop) in enumerate(zip(offsets, offsets[1:], strict=False)):
+    for w, (start, stop) in enumerate(itertools.pairwise(offsets)):
         edges = np.arange(start, stop, BLOCK)
         begin.append(edges)
         end.append(np.minimum(edges + BLOCK, stop))

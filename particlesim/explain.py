@@ -6,6 +6,8 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from .launch import Launch, When
+
 if TYPE_CHECKING:
     from .simulation import Simulation
 
@@ -53,17 +55,21 @@ class Explanation:
         return "\n".join([*lines, "", f"execution: {self.execution}"])
 
 
+def kernel_name(operation: Launch) -> str:
+    """The kernel's function, without the factory that made it."""
+    return str(operation.kernel.key).rpartition("__")[2]
+
+
 def explain(sim: Simulation) -> Explanation:
     """Describe a simulation."""
     count = max(1, sim.particle_count)
     frame = sim.executor.frame
     always, sometimes = [], []
     for operation in frame.substep.operations:
-        body = getattr(operation, "body", None)
-        if body is not None:
-            sometimes += [(o.owner, o.kernel.key, o.dim) for o in body.launches()]
-        elif hasattr(operation, "kernel"):
-            always.append((operation.owner, operation.kernel.key, operation.dim))
+        if isinstance(operation, When):
+            sometimes += [(o.owner, kernel_name(o), o.dim) for o in operation.body.launches()]
+        elif isinstance(operation, Launch):
+            always.append((operation.owner, kernel_name(operation), operation.dim))
     arrays = {name: a.capacity / count for name, a in sim.state.arrays.items()}
     total = sum(arrays.values()) + sum(each.memory for each in sim.neighbors.lists) / count
     chosen = sim.executor.chosen

@@ -9,6 +9,7 @@ result does not depend on how it is cut: graph, threads and any number of them a
 
 from __future__ import annotations
 
+import itertools
 import os
 import queue
 import threading
@@ -57,7 +58,7 @@ class Launch:
                 device=self.device,
                 record_cmd=True,
             )
-            for start, stop in zip(edges, edges[1:], strict=False)
+            for start, stop in itertools.pairwise(edges)
         ]
 
 
@@ -187,13 +188,15 @@ class GraphExecutor:
         frame.load()
         # A graph of many nodes takes long to capture: beyond a point the substep's is replayed.
         whole = frame.repeat * len(frame.substep.operations) <= LARGEST_GRAPH
-        plan = [(frame.parts, 1)] if whole else [((part,), 1) for part in frame.parts]
-        if not whole:
-            plan[1] = ((frame.substep,), frame.repeat)
-        self.graphs = [
-            (_capture(parts, frame.repeat if whole else 1, frame.substep, device), times)
-            for parts, times in plan
-        ]
+        if whole:
+            middle = [frame.substep] * frame.repeat
+            self.graphs = [(_capture([frame.before, *middle, frame.after], device), 1)]
+        else:
+            self.graphs = [
+                (_capture([frame.before], device), 1),
+                (_capture([frame.substep], device), frame.repeat),
+                (_capture([frame.after], device), 1),
+            ]
 
     def run(self) -> None:
         for graph, times in self.graphs:
@@ -204,11 +207,10 @@ class GraphExecutor:
         """Nothing to end."""
 
 
-def _capture(parts: Sequence[Program], repeat: int, repeated: Program, device: Any) -> Any:
+def _capture(parts: Sequence[Program], device: Any) -> Any:
     with wp.ScopedCapture(device=device) as capture:
         for part in parts:
-            for _ in range(repeat if part is repeated else 1):
-                part.issue()
+            part.issue()
     return capture.graph
 
 
@@ -293,9 +295,8 @@ class Executor:
         self._times: dict[str, list[float]] = {"graph": [], "threads": []}
         self._tried: dict[str, GraphExecutor | ThreadExecutor] = {}
         way = settings.execution
-        if not device.is_cpu:
-            way = "graph"
-        elif way == "auto" and (self.threads == 1 or frame.largest < 2 * CHUNK):
+        small = self.threads == 1 or frame.largest < 2 * CHUNK
+        if not device.is_cpu or (way == "auto" and small):
             way = "graph"
         if way != "auto":
             self.chosen = self._make(way)

@@ -140,9 +140,7 @@ class Model:
         """Positions moved into the periodic box of their world."""
         length = self.box_length[self.world_of]
         lower = self.box_lower[self.world_of]
-        inside = np.divide(
-            position - lower, length, out=np.zeros_like(position), where=length > 0
-        )
+        inside = np.divide(position - lower, length, out=np.zeros_like(position), where=length > 0)
         return position - length * np.floor(inside)
 
     def members(self, groups: Sequence[Any], owner: str) -> np.ndarray:

@@ -109,9 +109,9 @@ def _points(sim: Simulation) -> list[PointsPrim]:
             if not len(group):
                 continue
             diameter = 2.0 * scene.radius[group.slice]
-            width = None if not diameter.any() else diameter
-            if width is not None and np.ptp(width) == 0:
-                width = float(width[0])
+            width: np.ndarray | float | None = diameter if diameter.any() else None
+            if width is not None and np.ptp(diameter) == 0:
+                width = float(diameter[0])
             points.append(
                 PointsPrim(
                     w, group.name, slice(offset + group.start, offset + group.stop),

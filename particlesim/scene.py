@@ -10,7 +10,7 @@ import numpy as np
 from . import validate
 
 if TYPE_CHECKING:
-    from .constraints.base import Constraint
+    from .constraints.base import ConstraintBase
     from .interactions.base import Interaction
 
 # Names of the engine's own per-particle arrays, which attributes of a scene cannot take.
@@ -18,7 +18,8 @@ RESERVED = frozenset(
     "position velocity mass inverse_mass radius force world density pressure correction image "
     "previous_position position_error velocity_error time dt".split()
 )
-PALETTE = (
+Color = tuple[float, float, float]
+PALETTE: tuple[Color, ...] = (
     (0.26, 0.52, 0.86), (0.90, 0.45, 0.20), (0.35, 0.70, 0.40), (0.80, 0.30, 0.45),
     (0.60, 0.45, 0.80), (0.85, 0.70, 0.25), (0.40, 0.70, 0.75), (0.60, 0.55, 0.50),
 )  # fmt: skip
@@ -31,7 +32,7 @@ class Group:
     arrays of indices, ready for pairs and constraints.
     """
 
-    def __init__(self, scene: Scene, name: str, start: int, stop: int, color: tuple[float, ...]):
+    def __init__(self, scene: Scene, name: str, start: int, stop: int, color: Color):
         self.scene, self.name, self.start, self.stop = scene, name, start, stop
         self.color = color
 
@@ -88,7 +89,7 @@ class Scene:
         self.periodic = _box(periodic)
         self.groups: list[Group] = []
         self.interactions: list[Interaction] = []
-        self.constraints: list[Constraint] = []
+        self.constraints: list[ConstraintBase] = []
         self._columns: dict[str, list[np.ndarray]] = {}
         self._widths: dict[str, int | None] = {}
         self.particle_count = 0
@@ -150,7 +151,10 @@ class Scene:
             width = self._widths[key]
             shape = (count,) if width is None else (count, width)
             parts.append(columns.get(key, np.zeros(shape)))
-        chosen = tuple(map(float, color or PALETTE[len(self.groups) % len(PALETTE)]))
+        chosen = PALETTE[len(self.groups) % len(PALETTE)]
+        if color is not None:
+            red, green, blue = validate.vector(owner, "color", color)
+            chosen = (float(red), float(green), float(blue))
         result = Group(self, name, self.particle_count, self.particle_count + count, chosen)
         self.groups.append(result)
         self.particle_count += count
@@ -179,7 +183,7 @@ class Scene:
         self.interactions.append(interaction)
         return interaction
 
-    def add_constraint(self, constraint: Constraint) -> Constraint:
+    def add_constraint(self, constraint: ConstraintBase) -> ConstraintBase:
         """Add a constraint; it projects positions after integration, in the order of adding."""
         from .constraints.base import ConstraintBase
 

@@ -6,7 +6,8 @@ temporary name and ``os.replace``, so that whatever kills the process, finished 
 Memory does not grow with the number of frames.
 
 What is recorded is described on the host (:mod:`particlesim.usd_info`), so that any source of
-arrays can be recorded (:mod:`particlesim.record` does it for simulations). How the root looks inside is :mod:`particlesim.usd_stage`.
+arrays can be recorded (:mod:`particlesim.record` does it for simulations). How the root looks
+inside is :mod:`particlesim.usd_stage`.
 """
 
 from __future__ import annotations

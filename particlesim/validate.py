@@ -66,16 +66,16 @@ def vector(owner: str, argument: str, value: Any, *, unit: str = "") -> np.ndarr
     return result
 
 
-def rows(
-    owner: str, argument: str, value: Any, count: int | None, width: int | None
-) -> np.ndarray:
+def rows(owner: str, argument: str, value: Any, count: int | None, width: int | None) -> np.ndarray:
     """``value`` as a finite (count, width) or, for width None, (count,) array; broadcast to it."""
     result = _array(owner, argument, value)
     if count is None:
         if result.ndim != 2 or result.shape[1] != width:
             if result.size == 0:
                 return np.zeros((0, width or 1))
-            raise fail(owner, argument, f"have shape (n, {width})", result, "give one row a particle")
+            raise fail(
+                owner, argument, f"have shape (n, {width})", result, "give one row a particle"
+            )
     else:
         shape: tuple[int, ...] = (count,) if width is None else (count, width)
         try:

@@ -52,11 +52,12 @@ def scatter(kind, count=900, seed=0):
     if kind == "random":
         return rng.uniform(0, 10, (count, 3))
     if kind == "clustered":
-        return rng.uniform(0, 30, (9, 3))[rng.integers(0, 9, count)] + rng.normal(0, 0.5, (count, 3))
+        centers = rng.uniform(0, 30, (9, 3))
+        return centers[rng.integers(0, 9, count)] + rng.normal(0, 0.5, (count, 3))
     if kind == "negative":
         return rng.uniform(-12, 3, (count, 3))
     if kind == "far":
-        return rng.uniform(0, 10, (count, 3)) + [1e4, -3e4, 7e3]
+        return rng.uniform(0, 10, (count, 3)) + np.array([1e4, -3e4, 7e3])
     if kind == "flat":
         return rng.uniform(0, 30, (count, 3)) * [1, 1, 0]
     if kind == "coincident":

@@ -9,20 +9,15 @@ import warp as wp
 from .. import validate
 from ..law import Law, law
 
-
-# What an equation of state may name, beside rest_density, smoothing_length and its parameters.
-STATE_VARIABLES = ("density",)
-
-
 class EquationOfState:
     """Base of barotropic equations of state P(rho).
 
-    A member gives three laws. Each may name ``density``, ``rest_density`` (from the ``SPH``) and
-    the member's own ``parameters``:
+    A member gives three laws. Each may name ``density``, ``rest_density`` and ``smoothing_length``
+    of the ``SPH``, and the member's own ``parameters``:
 
     - ``pressure``: P [mass / (length time^2)];
     - ``energy``: u = int P / rho^2 drho per mass [length^2/time^2], the potential of the pressure;
-    - ``sound_speed``: c = sqrt(dP/drho) [length/time], for viscosities and step sizes.
+    - ``sound_speed``: c = sqrt(dP/drho) [length/time]; it may name ``pressure`` too.
     """
 
     pressure: Law
@@ -55,18 +50,32 @@ def tait_energy(density: float, rest_density: float, sound_speed: float, exponen
 
 
 @law
-def tait_sound_speed(density: float, rest_density: float, sound_speed: float, exponent: float):
-    return sound_speed * wp.pow(density / rest_density, 0.5 * (exponent - 1.0))
+def tait_sound_speed(
+    density: float, pressure: float, rest_density: float, sound_speed: float, exponent: float
+):
+    """c^2 = gamma (P + B) / rho, which spares the power."""
+    return wp.sqrt((exponent * pressure + sound_speed * sound_speed * rest_density) / density)
 
 
 @law
-def repulsive_tait_pressure(density: float, rest_density: float, sound_speed: float, exponent: float):
+def repulsive_tait_pressure(
+    density: float, rest_density: float, sound_speed: float, exponent: float
+):
     return tait_pressure(wp.max(density, rest_density), rest_density, sound_speed, exponent)
 
 
 @law
 def repulsive_tait_energy(density: float, rest_density: float, sound_speed: float, exponent: float):
     return tait_energy(wp.max(density, rest_density), rest_density, sound_speed, exponent)
+
+
+@law
+def repulsive_tait_sound_speed(
+    density: float, pressure: float, rest_density: float, sound_speed: float, exponent: float
+):
+    return tait_sound_speed(
+        wp.max(density, rest_density), pressure, rest_density, sound_speed, exponent
+    )
 
 
 class Tait(EquationOfState):
@@ -101,9 +110,12 @@ class Tait(EquationOfState):
             "exponent": validate.number(self.name, "exponent", exponent, above=1.0),
         }
         self.negative_pressure = bool(negative_pressure)
-        self.sound_speed = tait_sound_speed
-        self.pressure = tait_pressure if negative_pressure else repulsive_tait_pressure
-        self.energy = tait_energy if negative_pressure else repulsive_tait_energy
+        if self.negative_pressure:
+            self.pressure, self.energy = tait_pressure, tait_energy
+            self.sound_speed = tait_sound_speed
+        else:
+            self.pressure, self.energy = repulsive_tait_pressure, repulsive_tait_energy
+            self.sound_speed = repulsive_tait_sound_speed
 
 
 @law
@@ -117,8 +129,8 @@ def polytrope_energy(density: float, constant: float, index: float):
 
 
 @law
-def polytrope_sound_speed(density: float, constant: float, index: float):
-    return wp.sqrt(constant * (1.0 + 1.0 / index) * wp.pow(density, 1.0 / index))
+def polytrope_sound_speed(density: float, pressure: float, index: float):
+    return wp.sqrt((1.0 + 1.0 / index) * pressure / density)
 
 
 class Polytrope(EquationOfState):

@@ -67,9 +67,7 @@ def _values(sph: SPH, owner: str, field: Any, world: int, order: np.ndarray) -> 
     return validate.rows(owner, "field", given, count, width)[rows]
 
 
-def _sums(
-    sph: SPH, world: int, slots: slice, where: np.ndarray, samples: np.ndarray
-) -> np.ndarray:
+def _sums(sph: SPH, world: int, slots: slice, where: np.ndarray, samples: np.ndarray) -> np.ndarray:
     """The sums of (V A, V) W at the points, by a grid over the particles as they are now."""
     model, device = sph.model, sph.model.device
     precision = model.precision

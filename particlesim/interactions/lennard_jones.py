@@ -38,7 +38,9 @@ def _laws(n: int, m: int) -> tuple[Law, Law]:
     power_n, power_m = _power(n), _power(m)
 
     @law
-    def mie_potential(r: float, strength: float, sigma: float, u_cut: float, f_cut: float, cut: float):
+    def mie_potential(
+        r: float, strength: float, sigma: float, u_cut: float, f_cut: float, cut: float
+    ):
         repulsion = power_n(sigma / r)
         attraction = power_m(sigma / r)
         return strength * (repulsion - attraction) - u_cut + (r - cut) * f_cut

@@ -54,21 +54,21 @@ class Pair(Interaction):
             if cutoff is None
             else validate.number(self.name, "cutoff", cutoff, above=0.0, unit="length")
         )
-        chosen = [each for each in (potential, force) if each is not None]
-        for each in chosen:
+        self.laws = [each for each in (potential, force) if each is not None]
+        for each in self.laws:
             if not each.parameters:
                 raise validate.fail(
                     self.name, "law", "take the distance r as its first parameter", each.name,
                     "write def law(r, ...)",
                 )  # fmt: skip
         self.arguments = [
-            Arguments(self.name, each, 1, parameters, ("_i", "_j")) for each in chosen
+            Arguments(self.name, each, 1, parameters, ("_i", "_j")) for each in self.laws
         ]
-        self.parameters = {}
+        self.parameters: dict[str, Any] = {}
         self.quantities: set[str] = set()
-        for each in self.arguments:
-            self.parameters |= each.values
-            self.quantities |= each.quantities
+        for argument in self.arguments:
+            self.parameters |= argument.values
+            self.quantities |= argument.quantities
         self.requires = frozenset({"force"}) | self.quantities
 
     def kind(self) -> tuple[Any, ...]:
@@ -83,9 +83,7 @@ class Pair(Interaction):
         cutoff = (
             None if self.cutoff is None else np.array([peer.cutoff for peer in self.peers], float)
         )
-        self.pairs = neighbors.request(
-            self.name, members, cutoff, self.quantities | {"position"}
-        )
+        self.pairs = neighbors.request(self.name, members, cutoff, self.quantities | {"position"})
         columns = self.columns(self.parameters)
         columns["cutoff_squared"] = (
             np.full(model.world_count, np.finfo(model.precision.numpy).max)
@@ -106,7 +104,8 @@ class Pair(Interaction):
         self.Out = structure_of("PairForces", out)
         self.out = filled(self.Out, out)
         precision = model.precision
-        chosen, derivative = (self.potential, True) if self.force is None else (self.force, False)
+        derivative = self.force is None
+        chosen = self.laws[-1]
         arguments = self.arguments[-1].source({"_i": "i", "_j": "j"})
         term = kernels.force_term(
             chosen.function(precision), arguments, derivative, precision, self.Data, self.Params

@@ -13,17 +13,24 @@ from ..kernels.pair import pair_kernel
 from ..launch import launch
 from ..law import Law
 from .base import Interaction
-from .equations_of_state import STATE_VARIABLES, EquationOfState
+from .equations_of_state import EquationOfState
 from .interpolation import interpolate
 from .pair import filled, structure_of
 from .smoothing import SMOOTHING, SUPPORT
-from .viscosities import PAIR_VARIABLES, Viscosity
+from .viscosities import Viscosity
 
 if TYPE_CHECKING:
     from ..model import Model
     from ..neighbors import Neighbors
     from ..state import State
 
+# What laws may name beside smoothing_length, rest_density and the parameters of their part.
+VARIABLES = {
+    "pressure": ("density",),
+    "energy": ("density",),
+    "sound_speed": ("density", "pressure"),
+    "term": ("approach", "distance_squared", "density", "sound_speed"),
+}
 COINCIDENT = 1e-6  # closer than this, in parts of h, particles count as coincident
 
 
@@ -279,7 +286,6 @@ def _one(owner: str, argument: str, value: Any, kind: type, example: str) -> Any
     """``value``, checked to be of this kind."""
     if not isinstance(value, kind):
         raise TypeError(
-            f"{owner}: {argument} must be one of {kind.__name__}, got {value!r}; "
-            f"give {example}."
+            f"{owner}: {argument} must be one of {kind.__name__}, got {value!r}; give {example}."
         )
     return value

@@ -9,11 +9,6 @@ import warp as wp
 from .. import validate
 from ..law import Law, law
 
-
-# What a viscosity may name of a pair, beside smoothing_length and its own parameters.
-PAIR_VARIABLES = ("approach", "distance_squared", "density", "sound_speed")
-
-
 class Viscosity:
     """Base of viscosities that act along the pair, as a term Pi_ij beside P/rho^2.
 
@@ -57,8 +52,9 @@ class ArtificialViscosity(Viscosity):
 
     With the means of c and rho over the pair; pairs that recede feel nothing (Monaghan 1992,
     eq. 4.2). It conserves momentum and angular momentum and turns kinetic energy into heat that
-    nobody keeps. In smooth flow it is about a kinematic viscosity of alpha c h / 10 in three
-    dimensions, alpha c h / 8 in two (Monaghan 2005, sec. 8.2, halved as receding pairs feel none).
+    nobody keeps. In shear it is a kinematic viscosity of about
+    alpha c h / (4 (d + 2)) in d dimensions: half of alpha c h / (2 (d + 2)), which it would be if
+    receding pairs felt it too (Monaghan 2005, sec. 8.2).
 
     Args:
         alpha: Strength of the part linear in the speed, at least 0.
