@@ -94,11 +94,9 @@ def force_term(
         state_j = state_of(d.state, j)
         stress = state_i[2] + state_j[2]
         if wp.static(viscous):
-            half = real(0.5)
-            stress += viscosity(
-                wp.dot(velocity_of(d.v, i) - velocity_of(d.v, j), x_ij), distance2, half * (state_i[1] + state_j[1]),
-                half * (state_i[3] + state_j[3]), p,
-            )  # fmt: skip
+            v_ij = velocity_of(d.v, i) - velocity_of(d.v, j)
+            mean = real(0.5) * (state_i + state_j)
+            stress += viscosity(wp.dot(v_ij, x_ij), distance2, mean[1], mean[3], p)
         # In this order no factor leaves the range of float32 before the others bring it back.
         gradient = (state_j[0] * p.sigma) * slope(wp.sqrt(distance2) * p.inverse_h)
         return (along * p.inverse_h) * (-gradient * stress * p.inverse_h)
@@ -146,9 +144,7 @@ def cell_coordinates_kernel(precision: Precision) -> wp.Kernel:
     vec3, Cells = precision.vec3, cells_type(precision)
 
     @register
-    def point_cells(
-        first: int, cells: Cells, x: wp.array(dtype=vec3), u_out: wp.array(dtype=vec3)
-    ):
+    def point_cells(first: int, cells: Cells, x: wp.array(dtype=vec3), u_out: wp.array(dtype=vec3)):
         k = first + wp.tid()
         u_out[k] = wp.cw_mul(x[k] - cells.origin, cells.scale)
 

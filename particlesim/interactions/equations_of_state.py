@@ -9,6 +9,7 @@ import warp as wp
 from .. import validate
 from ..law import Law, law
 
+
 class EquationOfState:
     """Base of barotropic equations of state P(rho).
 
@@ -31,9 +32,9 @@ class EquationOfState:
         return type(self).__name__
 
     @property
-    def laws(self) -> tuple[Law, Law, Law]:
-        """All laws of the member."""
-        return self.pressure, self.energy, self.sound_speed
+    def laws(self) -> dict[str, Law]:
+        """The laws by name."""
+        return {name: getattr(self, name) for name in ("pressure", "energy", "sound_speed")}
 
 
 @law

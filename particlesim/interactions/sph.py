@@ -11,7 +11,7 @@ from .. import validate
 from ..kernels import sph as kernels
 from ..kernels.pair import pair_kernel
 from ..launch import launch
-from ..law import Law
+from ..neighbors import VerletList
 from .base import Interaction
 from .equations_of_state import EquationOfState
 from .interpolation import interpolate
@@ -118,30 +118,31 @@ class SPH(Interaction):
             self.parameters["rest_density"] = validate.number(
                 self.name, "rest_density", rest_density, above=0.0, unit="mass/length^d"
             )
-        self._state_sources = self._sources("state", equation_of_state, STATE_VARIABLES)
+        self.sources: dict[str, dict[str, str]] = {}
+        self._take("state", equation_of_state)
         if viscosity is not None:
-            self._pair_sources = self._sources("viscosity", viscosity, PAIR_VARIABLES)
+            self._take("viscosity", viscosity)
 
-    def _sources(self, prefix: str, part: Any, variables: tuple[str, ...]) -> dict[str, str]:
-        """What fills the arguments of a part's laws; its parameters join those of the fluid."""
-        sources = {name: f"p.{name}" for name in ("smoothing_length", "rest_density")}
+    def _take(self, prefix: str, part: EquationOfState | Viscosity) -> None:
+        """Note what fills the arguments of a part's laws; its parameters join the fluid's."""
+        own = {name: f"p.{name}" for name in ("smoothing_length", "rest_density")}
         for name, value in part.parameters.items():
             self.parameters[f"{prefix}_{name}"] = value
-            sources[name] = f"p.{prefix}_{name}"
-        sources |= {name: name for name in variables}
-        for law in part.laws:
+            own[name] = f"p.{prefix}_{name}"
+        for name, law in part.laws.items():
+            sources = own | {variable: variable for variable in VARIABLES[name]}
             validate.known(part.name, law.parameters, sources, f"argument of {law.name}")
             if "rest_density" in law.parameters and "rest_density" not in self.parameters:
                 raise validate.fail(
                     self.name, "rest_density", "be given [mass/length^d]", None,
                     f"{part.name} asks for it",
                 )  # fmt: skip
-        return sources
+            self.sources[name] = sources
 
     def kind(self) -> tuple[Any, ...]:
-        laws = self.equation_of_state.laws + (self.viscosity.laws if self.viscosity else ())
-        return (type(self), *(law.func for law in laws), self.smoothing, self.dimension,
-                tuple(self.parameters))  # fmt: skip
+        parts = [self.equation_of_state, *([self.viscosity] if self.viscosity else [])]
+        laws = [law.func for part in parts for law in part.laws.values()]
+        return (type(self), *laws, self.smoothing, self.dimension, tuple(self.parameters))
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
@@ -149,9 +150,12 @@ class SPH(Interaction):
         columns = self.columns(self.parameters)
         h = columns["smoothing_length"]
         names = {"position", "mass"} | ({"velocity"} if self.viscosity else set())
-        self.pairs = neighbors.request(self.name, members, SUPPORT * h, names)
+        pairs = neighbors.request(self.name, members, SUPPORT * h, names)
+        assert isinstance(pairs, VerletList)  # as there is a cutoff
+        self.pairs = pairs
         columns["inverse_h"] = 1.0 / h
-        columns["sigma"] = self.smoothing.sigma / h**self.dimension
+        with np.errstate(divide="ignore", over="ignore", under="ignore"):
+            columns["sigma"] = self.smoothing.sigma / h**self.dimension
         columns["cutoff_squared"] = (SUPPORT * h) ** 2
         columns["closest_squared"] = (COINCIDENT * h) ** 2
         self._check_range(columns)
@@ -190,7 +194,8 @@ class SPH(Interaction):
         self.weight = self.smoothing.weight.function(precision)
         term = kernels.density_term(self.weight, precision, self.Data, self.Params)
         store = kernels.keep_state(
-            self.weight, self._law_of_state("pressure"), self._law_of_state("sound_speed"),
+            self.weight, self._law(self.equation_of_state, "pressure"),
+            self._law(self.equation_of_state, "sound_speed") if self.viscosity else None,
             precision, self.Data, self.Params, Out,
         )  # fmt: skip
         self.density_kernel = self._kernel(term, store, Out, 1)
@@ -198,12 +203,7 @@ class SPH(Interaction):
     def _attach_force(self, state: State) -> None:
         precision = self.model.precision
         Out, self.force_out = self._out("FluidForces", {"f": state.force})
-        viscosity = None
-        if self.viscosity is not None:
-            viscosity = kernels.bound_law(
-                "viscosity", self.viscosity.term.function(precision), PAIR_VARIABLES,
-                self._pair_sources, precision, self.Params,
-            )  # fmt: skip
+        viscosity = self._law(self.viscosity, "term") if self.viscosity else None
         self.force_term = kernels.force_term(
             self.smoothing.slope.function(precision), viscosity, self.dimension, precision,
             self.Data, self.Params,
@@ -211,12 +211,12 @@ class SPH(Interaction):
         store = kernels.add_force(precision, self.Data, self.Params, Out)
         self.force_kernel = self._kernel(self.force_term, store, Out, 3)
 
-    def _law_of_state(self, name: str) -> Any:
-        law: Law = getattr(self.equation_of_state, name)
+    def _law(self, part: EquationOfState | Viscosity, name: str) -> Any:
+        """A law of a part as a function of its variables and the fluid's parameters."""
         precision = self.model.precision
         return kernels.bound_law(
-            name, law.function(precision), STATE_VARIABLES, self._state_sources, precision,
-            self.Params,
+            name, part.laws[name].function(precision), VARIABLES[name], self.sources[name],
+            precision, self.Params,
         )  # fmt: skip
 
     def _out(self, name: str, fields: dict[str, wp.array]) -> tuple[Any, Any]:
@@ -251,7 +251,7 @@ class SPH(Interaction):
         Out, out = self._out("FluidMeasures", {"energy": energy, "virial": virial})
         term = kernels.virial_term(self.force_term, precision, self.Data, self.Params)
         store = kernels.keep_measure(
-            self._law_of_state("energy"), precision, self.Data, self.Params, Out
+            self._law(self.equation_of_state, "energy"), precision, self.Data, self.Params, Out
         )
         self._launch(self._kernel(term, store, Out, 1), out)
 

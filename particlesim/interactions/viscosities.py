@@ -9,6 +9,7 @@ import warp as wp
 from .. import validate
 from ..law import Law, law
 
+
 class Viscosity:
     """Base of viscosities that act along the pair, as a term Pi_ij beside P/rho^2.
 
@@ -32,9 +33,9 @@ class Viscosity:
         return type(self).__name__
 
     @property
-    def laws(self) -> tuple[Law, ...]:
-        """All laws of the member."""
-        return (self.term,)
+    def laws(self) -> dict[str, Law]:
+        """The laws by name."""
+        return {"term": self.term}
 
 
 @law
@@ -48,11 +49,11 @@ def artificial_viscosity(
 
 
 class ArtificialViscosity(Viscosity):
-    """Pi_ij = (-alpha c mu + beta mu^2) / rho, mu = h v_ij.x_ij / (r^2 + 0.01 h^2), if v_ij.x_ij < 0.
+    """Pi_ij = (-alpha c mu + beta mu^2) / rho, mu = h v_ij.x_ij / (r^2 + 0.01 h^2).
 
-    With the means of c and rho over the pair; pairs that recede feel nothing (Monaghan 1992,
-    eq. 4.2). It conserves momentum and angular momentum and turns kinetic energy into heat that
-    nobody keeps. In shear it is a kinematic viscosity of about
+    Where v_ij.x_ij < 0, with the means of c and rho over the pair; pairs that recede feel nothing
+    (Monaghan 1992, eq. 4.2). It conserves momentum and angular momentum and turns kinetic energy
+    into heat that nobody keeps. In shear it is a kinematic viscosity of about
     alpha c h / (4 (d + 2)) in d dimensions: half of alpha c h / (2 (d + 2)), which it would be if
     receding pairs felt it too (Monaghan 2005, sec. 8.2).
 

@@ -27,9 +27,7 @@ STEP = 0.3 * SMOOTHING_LENGTH / SOUND_SPEED
 @ps.law
 def walls(position: wp.vec3, mass: float, stiffness: float, length: float, width: float):
     """Springs against what lies outside of a trough, stiffness per mass."""
-    low = wp.vec3(
-        wp.min(position[0], 0.0), wp.min(position[1], 0.0), wp.min(position[2], 0.0)
-    )
+    low = wp.vec3(wp.min(position[0], 0.0), wp.min(position[1], 0.0), wp.min(position[2], 0.0))
     high = wp.vec3(wp.max(position[0] - length, 0.0), 0.0, wp.max(position[2] - width, 0.0))
     return -mass * stiffness * (low + high)
 

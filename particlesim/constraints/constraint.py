@@ -1,0 +1,269 @@
+"""Constraints on given tuples of particles, from one law C(x)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from .. import topology, validate
+from ..interactions.pair import as_law
+from ..kernels import constraints as kernels
+from ..launch import launch
+from ..law import Law
+from .base import ConstraintBase
+from .tuples import Tuples, bodies
+
+if TYPE_CHECKING:
+    from ..model import Model
+    from ..neighbors import Neighbors
+    from ..state import State
+    from .force import ConstraintForce
+
+OWN = ("compliance", "damping", "break_force")  # parameters of every constraint
+
+
+class Constraint(ConstraintBase):
+    r"""C(x) = 0, or C(x) >= 0, on tuples of particles: XPBD with a gradient derived from C.
+
+    In each iteration a tuple's multiplier lam, zero at the start of a substep, grows by
+
+        dlam = (-C - alpha~ lam - gamma grad C . (x - x_prev)) / ((1 + gamma) sum w |grad C|^2 + alpha~)
+
+    with alpha~ = alpha / dt^2 and gamma = alpha beta / dt, and its particles move by
+    w_a grad_a C dlam (Macklin, Mueller and Chentanez 2016, eqs. 17, 18 and 26). Tuples are solved
+    one after the other (Gauss-Seidel), those that share no particle at once. The result is that
+    of a spring of stiffness 1/alpha with a damper beta, however many iterations are made.
+
+    Write C as a length or an angle rather than a square of it: a step follows the tangent of C,
+    and is as good as the tangent. Tuples whose gradient vanishes, and those with all particles
+    pinned, stay as they are.
+
+    Args:
+        law: ``C(x_0, ..., x_(k-1), ...)``: the first k parameters are the positions, ``wp.vec3``
+            (in a periodic scene the images next to x_0), the others are given by keyword.
+        particles: (m, k) indices, distinct within a row; (m,) for k = 1.
+        compliance: alpha, the inverse of the stiffness [C / force], one or (m,), at least 0.
+        damping: beta, force on C for its rate [force time / C], one or (m,), at least 0. Acts
+            through the compliance: a rigid constraint has nothing to damp.
+        inequality: Hold C >= 0 only: acts while C < 0, and only pushes C up.
+        break_force: Force on an end beyond which a tuple is gone for good [force], one or (m,),
+            above 0; None: unbreakable.
+        **parameters: The law's further parameters: one for all or (m,) numbers; (3,) or (m, 3)
+            where the law takes a ``wp.vec3``.
+
+    Raises:
+        ValueError: Wrong shapes, indices or values; a parameter that is missing.
+        TypeError: A parameter that the law does not have.
+
+    Example:
+        >>> import warp as wp
+        >>> from particlesim import law
+        >>> @law
+        ... def distance(a: wp.vec3, b: wp.vec3, rest_length: float):
+        ...     return wp.length(b - a) - rest_length
+        >>> Constraint(distance, [(0, 1), (1, 2)], rest_length=1.0, compliance=1e-6).particles.shape
+        (2, 2)
+    """
+
+    relative = False  # the evaluation takes positions from the first particle's
+    unit = False  # its gradients have unit length
+
+    def __init__(
+        self,
+        law: Any,
+        particles: Any,
+        *,
+        compliance: Any = 0.0,
+        damping: Any = 0.0,
+        inequality: bool = False,
+        break_force: Any = None,
+        **parameters: Any,
+    ):
+        self.law = as_law(law)
+        size = self._size(parameters)
+        self.particles = topology.tuples(self.name, "particles", particles, size)
+        self.inequality = bool(inequality)
+        count = len(self.particles)
+        self.compliance = topology.per_item(self.name, "compliance", compliance, count, minimum=0)
+        self.damping = topology.per_item(self.name, "damping", damping, count, minimum=0)
+        self.break_force = self._limit(break_force, count)
+        self.parameters = self._values(parameters, size, count)
+
+    def _size(self, given: dict[str, Any]) -> int:
+        """How many positions the law takes: its first vectors, but for those given by keyword."""
+        size = 0
+        for name, kind in self.law.parameters.items():
+            if kind is not wp.vec3 or name in given:
+                break
+            size += 1
+        if not size:
+            raise validate.fail(
+                self.name, "law", "take positions (wp.vec3) first", self.law.name,
+                "write def law(a: wp.vec3, b: wp.vec3, ...)",
+            )  # fmt: skip
+        return size
+
+    def _limit(self, value: Any, count: int) -> np.ndarray | None:
+        if value is None:
+            return None
+        limit = topology.per_item(self.name, "break_force", value, count, minimum=0)
+        if limit.size and not limit.min() > 0:
+            raise validate.fail(
+                self.name, f"break_force[{int(np.argmin(limit))}]", "be above 0 [force]",
+                float(limit.min()), "leave out what should not be there",
+            )  # fmt: skip
+        return limit
+
+    def _values(self, given: dict[str, Any], size: int, count: int) -> dict[str, np.ndarray]:
+        names = list(self.law.parameters)[size:]
+        validate.known(self.name, given, names, f"parameter of {self.law.name}")
+        values = {}
+        for name in names:
+            if name in OWN:
+                raise validate.fail(
+                    self.name, f"parameter {name} of {self.law.name}", "have a name of its own",
+                    name, "rename it",
+                )  # fmt: skip
+            if name not in given and name not in self.law.defaults:
+                raise validate.fail(
+                    self.name, name,
+                    f"be given, as {self.law.name}({', '.join(self.law.parameters)}) asks for it",
+                    None, f"pass {name}=...",
+                )  # fmt: skip
+            value = given.get(name, self.law.defaults.get(name))
+            width = 3 if self.law.parameters[name] is wp.vec3 else None
+            values[name] = validate.rows(self.name, name, value, count, width)
+        return values
+
+    def kind(self) -> tuple[Any, ...]:
+        return (
+            type(self), self.law.func, self.particles.shape[1], self.inequality,
+            self.break_force is None, tuple(self.parameters),
+        )  # fmt: skip
+
+    def links(self) -> np.ndarray:
+        """Pairs to draw, (m, 2) indices in the scene; none unless the tuples are pairs."""
+        return self.particles if self.particles.shape[1] == 2 else np.zeros((0, 2), dtype=np.int64)
+
+    def as_force(self) -> ConstraintForce:
+        """The same law as a penalty force, f = -grad C (C / alpha + beta dC/dt).
+
+        Give it to ``add_interaction`` instead of adding the constraint.
+
+        Raises:
+            ValueError: A compliance of 0, whose force would be infinite; a ``break_force``.
+        """
+        from .force import ConstraintForce
+
+        return ConstraintForce(self)
+
+    # The engine's side ------------------------------------------------------------------------
+
+    def columns(self, model: Model, w: int) -> dict[str, np.ndarray]:
+        """Parameters of each tuple of world w."""
+        limit = self.break_force
+        return {
+            "compliance": self.compliance,
+            "damping": self.damping,
+            "break_force": np.zeros(len(self.particles)) if limit is None else limit,
+            **self.parameters,
+        }
+
+    def evaluation(self, model: Model, item: Any) -> wp.Function:
+        """C and its gradient as a Warp function (see kernels.constraints)."""
+        return kernels.derived_evaluation(
+            self.law.function(model.precision), self.particles.shape[1], tuple(self.parameters),
+            model.precision, item,
+        )  # fmt: skip
+
+    def prepare(self, model: Model, neighbors: Neighbors) -> None:
+        self.model = model
+        self.tuples = Tuples(self.name, model, self.peers)
+        self.count = self.tuples.count
+
+    def attach(self, model: Model, state: State) -> None:
+        if not self.count:
+            return
+        tuples, precision = self.tuples, model.precision
+        self.struct = tuples.struct(
+            inequality=self.inequality, breakable=self.break_force is not None
+        )
+        self.bodies = bodies(model, state)
+        self.scale = wp.zeros(1, dtype=precision.scalar, device=model.device)
+        self.strain = wp.zeros_like(self.struct.lam)
+        shape = (
+            self.evaluation(model, tuples.Item), precision, model.periodic,
+            "position_error" in state, tuples.size, tuples.Item, self.relative,
+        )  # fmt: skip
+        self.project_kernel = kernels.project_kernel(*shape, self.unit)
+        self.strain_kernel = kernels.strain_kernel(*shape)
+
+    def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        if self.count and dt > 0:
+            reset = kernels.reset_kernel(self.model.precision)
+            inputs = [1.0 / dt, self.struct.lam, self.scale]
+            launch(reset, self.count, inputs, self.model.device)
+
+    def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        if not self.count or dt <= 0:
+            return
+        # Static projection: no time passes, and nothing moves of itself.
+        own = 0.0 if math.isinf(dt) else dt
+        for start, rows in self.tuples.spans:
+            inputs = [start, self.model.box, self.struct, self.bodies, own, 1.0 / dt]
+            launch(self.project_kernel, rows, inputs, self.model.device)
+
+    def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        if self.count and self.break_force is not None:
+            self._strain(may_break=True)
+
+    def _strain(self, may_break: bool) -> None:
+        inputs = [
+            int(may_break), self.model.box, self.struct, self.bodies, self.scale, self.strain,
+        ]  # fmt: skip
+        launch(self.strain_kernel, self.count, inputs, self.model.device)
+
+    def persistent(self) -> dict[str, wp.array]:
+        breakable = self.count and self.break_force is not None
+        return {"broken": self.struct.broken} if breakable else {}
+
+    def reset(self, worlds: Sequence[int]) -> None:
+        for array in self.persistent().values():
+            host = array.numpy().copy()
+            host[np.isin(self.tuples.world, list(worlds))] = 0
+            array.assign(host)
+
+    # Reading ------------------------------------------------------------------------------------
+
+    @property
+    def force(self) -> np.ndarray:
+        """Estimated force on the end that feels most of it, |lam| |grad C| / dt^2 [force], (m,).
+
+        Of the last substep; world by world where the constraint stands for several.
+        """
+        bound = self.bound
+        if bound.count:
+            bound._strain(may_break=False)
+            return self._listed(bound.strain.numpy())
+        return np.zeros(0)
+
+    @property
+    def broken(self) -> np.ndarray:
+        """Which tuples have broken, (m,) bool, like :attr:`force`."""
+        bound = self.bound
+        if bound.count and bound.break_force is not None:
+            return self._listed(bound.struct.broken.numpy()) > 0
+        return self._listed(np.zeros(bound.count)) > 0
+
+    def _listed(self, rows: np.ndarray) -> np.ndarray:
+        """Values of the sorted rows in the order in which the tuples were given."""
+        bound = self.bound
+        values = np.empty_like(rows)
+        values[bound.tuples.order] = rows
+        edges = bound.tuples.edges
+        mine = [w for w, peer in enumerate(bound.peers) if self in (bound, peer)]
+        return np.concatenate([values[edges[w] : edges[w + 1]] for w in mine])

@@ -1,0 +1,93 @@
+"""Distances between pairs of particles: rods, springs, struts and ropes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from .. import topology, validate
+from ..kernels.constraints import distance_evaluation
+from ..law import law
+from .constraint import Constraint
+
+if TYPE_CHECKING:
+    from ..model import Model
+
+
+@law
+def _distance(a: wp.vec3, b: wp.vec3, rest_length: float):
+    return wp.length(b - a) - rest_length
+
+
+class Distance(Constraint):
+    """C = |x_1 - x_0| - L: the pairs keep their distance.
+
+    Coincident ends are pushed apart, along a fixed direction. Far from the origin the distance is
+    as exact as near to it where ``Settings.compensated`` is on.
+
+    Args:
+        pairs: (m, 2) indices of the ends.
+        rest_length: L [length], one or (m,), at least 0; None: the distances at the start.
+        compliance: alpha, the inverse of the stiffness [length / force], one or (m,), at least 0.
+        damping: beta [force time / length], one or (m,), at least 0 (see :class:`Constraint`).
+        inequality: Hold the distance to at least L: a strut that only pushes.
+        tension_only: Hold the distance to at most L: a rope that only pulls.
+        break_force: Force beyond which a pair is torn for good [force], one or (m,), above 0;
+            None: unbreakable.
+
+    Raises:
+        ValueError: Wrong shapes, ends that are the same, negative values, a strut that is a rope.
+
+    Example:
+        >>> rope = Distance([(0, 1), (1, 2)], rest_length=0.5, tension_only=True)
+        >>> rope.links().tolist()
+        [[0, 1], [1, 2]]
+    """
+
+    relative = True
+    unit = True
+
+    def __init__(
+        self,
+        pairs: Any,
+        rest_length: Any = None,
+        *,
+        compliance: Any = 0.0,
+        damping: Any = 0.0,
+        inequality: bool = False,
+        tension_only: bool = False,
+        break_force: Any = None,
+    ):
+        if inequality and tension_only:
+            raise validate.fail(
+                self.name, "tension_only", "be False with inequality", tension_only,
+                "use Distance without both for a rod",
+            )  # fmt: skip
+        pairs = topology.tuples(self.name, "pairs", pairs, 2)
+        self.from_start, self.tension_only = rest_length is None, bool(tension_only)
+        length = 0.0 if rest_length is None else rest_length
+        super().__init__(
+            _distance,
+            pairs,
+            compliance=compliance,
+            damping=damping,
+            inequality=inequality or tension_only,
+            break_force=break_force,
+            rest_length=topology.per_item(
+                self.name, "rest_length", length, len(pairs), minimum=0
+            ),
+        )  # fmt: skip
+
+    def kind(self) -> tuple[Any, ...]:
+        return (*super().kind(), self.tension_only)
+
+    def columns(self, model: Model, w: int) -> dict[str, np.ndarray]:
+        result = super().columns(model, w)
+        if self.from_start:
+            result["rest_length"] = topology.distances(model, w, self.particles)
+        return result
+
+    def evaluation(self, model: Model, item: Any) -> wp.Function:
+        return distance_evaluation(-1 if self.tension_only else 1, model.precision, item)

@@ -1,0 +1,96 @@
+"""A constraint as a force instead of a displacement."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from .. import validate
+from ..interactions.base import Interaction
+from ..kernels import constraint_force as kernels
+from ..launch import launch
+from .tuples import Tuples, bodies
+
+if TYPE_CHECKING:
+    from ..model import Model
+    from ..neighbors import Neighbors
+    from ..state import State
+    from .constraint import Constraint
+
+
+class ConstraintForce(Interaction):
+    """f_a = -grad_a C (C / alpha + beta dC/dt): a constraint's law as a penalty force.
+
+    The energy is C^2 / (2 alpha). Unlike the constraint it adds no numerical damping, and needs
+    dt below 2 sqrt(alpha / sum w |grad C|^2). With ``inequality`` it acts while C < 0.
+
+    Args:
+        constraint: Whose law, tuples and parameters to take; made by its ``as_force()``.
+
+    Raises:
+        ValueError: A compliance of 0; a ``break_force``.
+
+    Example:
+        >>> from particlesim import Distance
+        >>> Distance([(0, 1)], rest_length=1.0, compliance=1e-3).as_force().links().tolist()
+        [[0, 1]]
+    """
+
+    requires = frozenset({"force"})
+
+    def __init__(self, constraint: Constraint):
+        self.constraint = constraint
+        alpha = constraint.compliance
+        if alpha.size and not alpha.min() > 0:
+            raise validate.fail(
+                f"{constraint.name}.as_force", f"compliance[{int(np.argmin(alpha))}]",
+                "be above 0", float(alpha.min()), "its force would be infinite: use the constraint",
+            )  # fmt: skip
+        if constraint.break_force is not None:
+            raise validate.fail(
+                f"{constraint.name}.as_force", "break_force", "be None", constraint.break_force,
+                "only the constraint itself breaks",
+            )  # fmt: skip
+
+    @property
+    def name(self) -> str:
+        return f"{self.constraint.name} as a force"
+
+    def kind(self) -> tuple[Any, ...]:
+        return (type(self), *self.constraint.kind())
+
+    def links(self) -> np.ndarray:
+        """Pairs to draw, (m, 2) indices in the scene."""
+        return self.constraint.links()
+
+    def prepare(self, model: Model, neighbors: Neighbors) -> None:
+        self.model = model
+        self.tuples = Tuples(self.name, model, [peer.constraint for peer in self.peers])
+        self.rows = self.tuples.seats()
+        self.count = len(self.rows["particle"])
+
+    def attach(self, model: Model, state: State) -> None:
+        if not self.count:
+            return
+        constraint, tuples = self.constraint, self.tuples
+        self.struct = tuples.struct(inequality=constraint.inequality, breakable=False)
+        self.bodies = bodies(model, state)
+        self.seats = kernels.Seats()
+        for name, column in self.rows.items():
+            setattr(self.seats, name, model.array(column.astype(np.int32), wp.int32))
+        self.force_kernel, self.measure_kernel = kernels.force_kernels(
+            constraint.evaluation(model, tuples.Item), model.precision, model.periodic,
+            "position_error" in state, tuples.size, tuples.Item, constraint.relative,
+        )  # fmt: skip
+
+    def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        if self.count:
+            inputs = [self.seats, self.model.box, self.struct, self.bodies, state.force]
+            launch(self.force_kernel, self.count, inputs, self.model.device)
+
+    def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
+        if self.count:
+            inputs = [self.seats, self.model.box, self.struct, self.bodies, energy, virial]
+            launch(self.measure_kernel, self.count, inputs, self.model.device)

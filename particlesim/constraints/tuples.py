@@ -1,0 +1,95 @@
+"""Tuples of all worlds as the kernels take them: merged, sorted by colour, with their parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from .. import topology
+from ..kernels.constraints import bodies_type, tuples_type
+from ..model import Model
+from ..state import State
+
+
+class Tuples:
+    """The tuples of the peers of a constraint, one peer a world.
+
+    Row r of the arrays is tuple ``order[r]`` in the order in which the worlds list theirs. Rows of
+    one colour follow each other and share no particle: ``spans`` holds (first row, rows) of each.
+    """
+
+    def __init__(self, owner: str, model: Model, peers: Sequence[Any]):
+        each = [peer.particles for peer in peers]
+        particles = topology.merged(owner, "particles", model, each)
+        self.count, self.size = particles.shape
+        self.edges = np.concatenate([[0], np.cumsum([len(index) for index in each])])
+        color = _colors(each)
+        self.order = np.argsort(color, kind="stable")
+        rows = np.bincount(color) if self.count else np.zeros(0, dtype=np.int64)
+        starts = np.concatenate([[0], np.cumsum(rows)])
+        self.spans = [(int(start), int(n)) for start, n in zip(starts, rows, strict=False)]
+        self.particles = particles[self.order]
+        self.world = np.repeat(np.arange(len(each)), np.diff(self.edges))[self.order]
+        columns = [peer.columns(model, w) for w, peer in enumerate(peers)]
+        merged = {
+            name: np.concatenate([part[name] for part in columns])[self.order]
+            for name in columns[0]
+        }
+        self.Item, self.items = model.parameters("ConstraintItem", merged)
+        self.model = model
+
+    def struct(self, *, inequality: bool, breakable: bool) -> Any:
+        """The tuples as the kernels take them, with multipliers and, if breakable, marks."""
+        model = self.model
+        result = tuples_type(model.precision, self.size, self.Item)()
+        indices = wp.types.vector(length=self.size, dtype=wp.int32)
+        result.particle = model.array(self.particles.astype(np.int32), indices)
+        result.world = model.array(self.world.astype(np.int32), wp.int32)
+        result.item = self.items
+        result.lam = wp.zeros(self.count, dtype=model.precision.scalar, device=model.device)
+        if breakable:
+            result.broken = wp.zeros(self.count, dtype=wp.int32, device=model.device)
+        result.one_sided, result.breakable = int(inequality), int(breakable)
+        return result
+
+    def seats(self) -> dict[str, np.ndarray]:
+        """The tuples of every particle that is in one (see kernels.constraint_force)."""
+        ends = self.particles.reshape(-1)
+        order = np.argsort(ends, kind="stable")
+        particle, begin = np.unique(ends[order], return_index=True)
+        return {
+            "particle": particle,
+            "begin": np.append(begin, len(ends)),
+            "tuple": order // self.size,
+            "seat": order % self.size,
+        }
+
+
+def bodies(model: Model, state: State) -> Any:
+    """The arrays of the state that the kernels of constraints take."""
+    result = bodies_type(model.precision)()
+    names = {
+        "x": "position", "x_error": "position_error", "v": "velocity", "w": "inverse_mass",
+        "correction": "correction",
+    }  # fmt: skip
+    for field, name in names.items():
+        if name in state:
+            setattr(result, field, state[name])
+    return result
+
+
+def inverse(dt: float) -> float:
+    """1 / dt; zero for the static projection, whose dt is infinite."""
+    return 1.0 / dt
+
+
+def _colors(each: Sequence[np.ndarray]) -> np.ndarray:
+    """Colours of all tuples; those of equal worlds are found once."""
+    known: dict[int, np.ndarray] = {}
+    for index in each:
+        if id(index) not in known:
+            known[id(index)] = topology.colors(index)
+    return np.concatenate([known[id(index)] for index in each])
