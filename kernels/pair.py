@@ -66,6 +66,34 @@ def _term(
     return function_from_source(source, namespace)
 
 
+def fused_term(
+    terms: list[wp.Function], precision: Precision, data: Any, params: Any
+) -> wp.Function:
+    """Sum of several terms of forces, each within its own cutoff, with its own data and parameters.
+
+    Beyond its own cutoff a term is evaluated inside it and multiplied away, so that the loop has
+    no branch and a law is never asked where it need not be defined.
+    """
+    lines = ["def fused_force(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: Params):"]
+    for k in range(len(terms)):
+        lines += [
+            f"    c{k} = p.part_{k}.cutoff_squared",
+            f"    on{k} = r2 < c{k}",
+            f"    at{k} = wp.where(on{k}, r2, real(0.5) * c{k})",
+            f"    f{k} = term_{k}(i, j, x_ij, at{k}, d.part_{k}, p.part_{k})",
+            f"    w{k} = wp.where(on{k}, real(1.0), real(0.0))",
+        ]
+    lines.append("    return " + " + ".join(f"w{k} * f{k}" for k in range(len(terms))))
+    namespace = {
+        "wp": wp, "real": precision.scalar, "vec3": precision.vec3, "Data": data, "Params": params,
+        **{f"term_{k}": term for k, term in enumerate(terms)},
+    }  # fmt: skip
+    result = function_from_source("\n".join(lines) + "\n", namespace)
+    # Emitted behind the terms, which may themselves stand behind the adjoints they call.
+    result.adj.uses_grad_call = True
+    return result
+
+
 def pair_kernel(
     term: wp.Function, store: wp.Function, data: Any, params: Any, out: Any, width: int,
     precision: Precision, periodic: Periodicity, partners: str, vectorised: bool,
@@ -92,7 +120,7 @@ _KERNELS: dict[tuple, wp.Kernel] = {}
 def _pair_kernel(loop, term, store, data, params, out, precision, vectorised) -> wp.Kernel:
     Box, real, vec3 = box_type(precision), precision.scalar, precision.vec3
 
-    @register
+    @functools.partial(register, vectorised=vectorised)
     def sum_over_partners(
         first: int,
         pairs: Pairs,

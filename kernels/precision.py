@@ -11,6 +11,7 @@ import functools
 import hashlib
 import inspect
 import linecache
+import math
 import re
 import textwrap
 import types
@@ -50,23 +51,39 @@ FLOAT64 = Precision("float64", wp.float64, wp.vec3d, np.float64, "double")
 PRECISIONS = {"float32": FLOAT32, "float64": FLOAT64}
 
 
-class _Double(ast.NodeTransformer):
-    """Rewrites float literals, ``float`` and Warp's short vector names to float64."""
+class _Rewriter(ast.NodeTransformer):
+    """Rewrites a law's numbers and Warp's short names for a precision.
+
+    Attributes that are numbers (``math.pi``) become literals, so that a law's source says all.
+    """
+
+    def __init__(self, precision: Precision, scope: dict[str, Any]):
+        self.double, self.scope = precision is FLOAT64, scope
+
+    def _number(self, node: ast.AST) -> ast.AST:
+        if not self.double:
+            return node
+        call = ast.Call(func=_name("_float64", node), args=[node], keywords=[])
+        return ast.copy_location(call, node)
 
     def visit_Constant(self, node: ast.Constant) -> ast.AST:
-        if isinstance(node.value, float):
-            call = ast.Call(func=_name("_float64", node), args=[node], keywords=[])
-            return ast.copy_location(call, node)
-        return node
+        return self._number(node) if isinstance(node.value, float) else node
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
-        return _name("_float64", node) if node.id == "float" else node
+        return _name("_float64", node) if self.double and node.id == "float" else node
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
-        is_warp = isinstance(node.value, ast.Name) and node.value.id in ("wp", "warp")
-        if is_warp and node.attr in _DOUBLE:
+        if not isinstance(node.value, ast.Name):
+            return self.generic_visit(node)
+        owner = self.scope.get(node.value.id)
+        value = getattr(owner, node.attr, None)
+        if isinstance(value, float):
+            # Infinities and NaN have no literal, and are the same in both precisions.
+            known = ast.copy_location(ast.Constant(value), node) if math.isfinite(value) else node
+            return self._number(known)
+        if self.double and owner is wp and node.attr in _DOUBLE:
             return _name(f"_{node.attr}_double", node)
-        return self.generic_visit(node)
+        return node
 
     def visit_arguments(self, node: ast.arguments) -> ast.AST:
         return node  # annotations are mapped by value, see `annotation`
@@ -74,6 +91,18 @@ class _Double(ast.NodeTransformer):
 
 def _name(name: str, node: ast.AST) -> ast.AST:
     return ast.copy_location(ast.Name(id=name, ctx=ast.Load()), node)
+
+
+def constant(value: Any, precision: Precision) -> Any:
+    """A number or vector that a law refers to by name, in ``precision``; else the value itself."""
+    if precision is FLOAT32 or isinstance(value, int):
+        return value
+    if isinstance(value, float | wp.float32):
+        return wp.float64(float(value))
+    for name, double in _DOUBLE.items():
+        if type(value) is getattr(wp, name):
+            return double(*np.asarray(value, dtype=np.float64).ravel())
+    return value
 
 
 def annotation(kind: Any, precision: Precision) -> Any:
@@ -98,16 +127,18 @@ def translate(
     Warp function should call. The native name is a hash of the source, so that native snippets
     can call it by name and the kernel cache on disk is found again by the next process.
     """
-    source = textwrap.dedent(inspect.getsource(func))
-    extra = {"_float64": wp.float64, **{f"_{k}_double": v for k, v in _DOUBLE.items()}}
+    cells = dict(zip(func.__code__.co_freevars, func.__closure__ or (), strict=True))
+    scope = {**func.__globals__, **{name: cell.cell_contents for name, cell in cells.items()}}
+    source = _rewritten(func, precision, scope)
     names = func.__globals__.keys() & set(func.__code__.co_names) - {func.__name__}
-    used = {name: resolve(func.__globals__[name]) for name in names}
+    used = {name: constant(resolve(scope[name]), precision) for name in [*sorted(names), *cells]}
+    extra = {"_float64": wp.float64, **{f"_{k}_double": v for k, v in _DOUBLE.items()}}
     copy = types.FunctionType(
         func.__code__,
         {**func.__globals__, **used, **extra},
         func.__name__,
         func.__defaults__,
-        tuple(types.CellType(resolve(c.cell_contents)) for c in func.__closure__ or ()) or None,
+        tuple(types.CellType(used[name]) for name in cells) or None,
     )
     copy.__module__ = func.__module__
     copy.__annotations__ = {}
@@ -115,8 +146,7 @@ def translate(
         name: annotation(parameter.annotation, precision)
         for name, parameter in inspect.signature(func, eval_str=True).parameters.items()
     }
-    cells = [c.cell_contents for c in copy.__closure__ or ()]
-    digest = _digest(source, precision.name, *cells, *used.values())
+    digest = _digest(source, precision.name, *used.values())
     return wp.Function(
         copy,
         key=func.__name__,
@@ -124,17 +154,17 @@ def translate(
         module=wp.get_module(func.__module__),
         native_func=f"law_{func.__name__}_{digest}",
         overloaded_annotations=hints,
-        code_transformers=[_Double()] if precision is FLOAT64 else [],
-        source=_without_decorators(source),
+        source=source,
     )
 
 
-def _without_decorators(source: str) -> str:
-    tree = ast.parse(source)
+def _rewritten(func: Callable[..., Any], precision: Precision, scope: dict[str, Any]) -> str:
+    """The source of ``func`` in ``precision``, without decorators."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(func)))
     definition = tree.body[0]
     if isinstance(definition, ast.FunctionDef):
         definition.decorator_list = []
-    return ast.unparse(tree)
+    return ast.unparse(_Rewriter(precision, scope).visit(tree))
 
 
 def _digest(*parts: Any) -> str:
@@ -191,15 +221,19 @@ def native(stub: Callable[..., Any], snippet: str, after_gradients: bool = True)
     return result
 
 
-KERNELS: list[wp.Kernel] = []  # every kernel built in this process, for the CUDA compile test
+KERNELS: list[wp.Kernel] = []  # every kernel built in this process that CUDA can run
 
 kernel = functools.partial(wp.kernel, enable_backward=False, module="unique")
 
 
-def register(func: Callable[..., Any]) -> wp.Kernel:
-    """Make a kernel without a backward pass, in a module of its own, and remember it."""
+def register(func: Callable[..., Any], vectorised: bool = False) -> wp.Kernel:
+    """Make a kernel without a backward pass, in a module of its own, and remember it.
+
+    ``vectorised`` ones hold C++ that only the CPU's compiler takes; CUDA runs their plain twins.
+    """
     made = kernel(func)
-    KERNELS.append(made)
+    if not vectorised:
+        KERNELS.append(made)
     return made
 
 

@@ -1,6 +1,7 @@
 """particlesim: a general particle-physics framework on NVIDIA Warp."""
 
 from . import sample
+from .constraints import Constraint, ConstraintForce, Distance
 from .errors import SimulationError
 from .interactions import (
     SPH,
@@ -30,6 +31,9 @@ __all__ = [
     "SPH",
     "ArtificialViscosity",
     "ConstantForce",
+    "Constraint",
+    "ConstraintForce",
+    "Distance",
     "Drag",
     "Gravity",
     "Group",

@@ -14,6 +14,7 @@ from .diagnostics import Diagnostics, measure
 from .errors import SimulationError
 from .explain import Explanation, explain
 from .integrators import METHODS
+from .interactions.fusion import fuse
 from .kernels.integrate import tick_kernel
 from .kernels.reduce import finite_kernel
 from .launch import Executor, Frame, launch, owner, record
@@ -91,6 +92,7 @@ class Simulation:
         self.neighbors.allocate(self.state)
         for part in parts:
             part.attach(model, self.state)
+        self.passes = fuse(self.interactions)
         self._status = wp.zeros(1, dtype=wp.int32, device=self.device)
         self.snapshot = Snapshot(self)
         self._executor: Executor | None = None
@@ -115,7 +117,7 @@ class Simulation:
         """Interactions add forces at the present positions."""
         self.neighbors.update(self.state)
         self.state.clear_forces()
-        for interaction in self.interactions:
+        for interaction in self.passes:
             with owner(interaction.name):
                 interaction.apply(self.state, self.neighbors, dt)
 

@@ -80,6 +80,15 @@ def incidence(pairs: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
+def distances(model: Model, w: int, pairs: np.ndarray) -> np.ndarray:
+    """Distances of the pairs of world w at the start, (m,); to the nearest image."""
+    scene = model.scenes[w]
+    d = scene.position[pairs[:, 1]] - scene.position[pairs[:, 0]]
+    length = model.box_length[w]
+    wrapped = np.divide(d, length, out=np.zeros_like(d), where=length > 0)
+    return np.linalg.norm(d - length * np.round(wrapped), axis=1)
+
+
 def colors(index: np.ndarray) -> np.ndarray:
     """A colour for each tuple so that tuples of one colour share no particle (greedy).
 

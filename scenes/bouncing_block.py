@@ -1,9 +1,6 @@
 """A block held together by distance constraints bounces on the ground."""
 
-import numpy as np
-
 import particlesim as ps
-from particlesim.scenes.spring_lattice import NEAR, turned
 
 frames = 180
 settings = ps.Settings(dt=1 / 60, substeps=20, iterations=4)
@@ -27,20 +24,15 @@ def build(
         compliance: Of the constraints [m/N].
         tilt: Turn about z and x [rad].
     """
-    cells = np.stack(np.meshgrid(*[np.arange(size)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    index = {tuple(c): k for k, c in enumerate(cells.tolist())}
-    pairs = [
-        (k, index[other])
-        for c, k in index.items()
-        for d in NEAR
-        if (other := (c[0] + d[0], c[1] + d[1], c[2] + d[2])) in index
-    ]
-    x = turned((cells - (size - 1) / 2) * spacing, tilt)
+    side = size * spacing / 2
+    cube = ps.sample.box((-side,) * 3, (side,) * 3, spacing)
+    x = ps.sample.rotate(ps.sample.rotate(cube, (0, 0, 1), tilt), (1, 0, 0), tilt)
+    pairs = ps.sample.links(x, 1.8 * spacing)
     x[:, 1] += height - x[:, 1].min()
     scene = ps.Scene()
     block = scene.add_particles(x, mass=0.02, radius=spacing / 2, group="block")
     scene.add_interaction(ps.UniformGravity((0, -9.81, 0)))
-    scene.add_constraint(ps.Distance(block[np.array(pairs)], compliance=compliance))
+    scene.add_constraint(ps.Distance(block[pairs], compliance=compliance))
     scene.add_constraint(
         ps.PlaneBoundary((0, 0, 0), (0, 1, 0), friction=0.3, restitution=restitution)
     )

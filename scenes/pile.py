@@ -31,7 +31,5 @@ def build(count: int = 300, friction: float = 0.4, seed: int = 0) -> ps.Scene:
     )  # fmt: skip
     scene.add_interaction(ps.UniformGravity((0, -9.81, 0)))
     scene.add_constraint(ps.Contact(friction=friction))
-    scene.add_constraint(
-        ps.BoxBoundary((-0.6, 0, -0.6), (0.6, np.inf, 0.6), friction=friction)
-    )
+    scene.add_constraint(ps.BoxBoundary((-0.6, 0, -0.6), (0.6, np.inf, 0.6), friction=friction))
     return scene

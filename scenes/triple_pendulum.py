@@ -1,5 +1,7 @@
 """Three balls on rigid rods, released from the side: chaos that keeps its energy."""
 
+import itertools
+
 import numpy as np
 
 import particlesim as ps
@@ -25,7 +27,7 @@ def build(length: float = 0.4, angle: float = 120.0, radius: float = 0.05) -> ps
     )
     scene.add_interaction(ps.UniformGravity((0, -9.81, 0)))
     joints = [hinge[0], *balls]
-    scene.add_constraint(ps.Distance(list(zip(joints, joints[1:], strict=False))))
+    scene.add_constraint(ps.Distance(list(itertools.pairwise(joints))))
     return scene
 
 

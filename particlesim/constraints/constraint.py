@@ -13,7 +13,6 @@ from .. import topology, validate
 from ..interactions.pair import as_law
 from ..kernels import constraints as kernels
 from ..launch import launch
-from ..law import Law
 from .base import ConstraintBase
 from .tuples import Tuples, bodies
 

@@ -81,11 +81,6 @@ def bodies(model: Model, state: State) -> Any:
     return result
 
 
-def inverse(dt: float) -> float:
-    """1 / dt; zero for the static projection, whose dt is infinite."""
-    return 1.0 / dt
-
-
 def _colors(each: Sequence[np.ndarray]) -> np.ndarray:
     """Colours of all tuples; those of equal worlds are found once."""
     known: dict[int, np.ndarray] = {}

@@ -107,11 +107,11 @@ class Pair(Interaction):
         derivative = self.force is None
         chosen = self.laws[-1]
         arguments = self.arguments[-1].source({"_i": "i", "_j": "j"})
-        term = kernels.force_term(
+        self.term = kernels.force_term(
             chosen.function(precision), arguments, derivative, precision, self.Data, self.Params
         )
         store = kernels.add_force(precision, self.Data, self.Params, self.Out)
-        self.kernel = self._kernel(term, store, self.Out, 3, vectorised=model.device.is_cpu)
+        self.kernel = self._kernel(self.term, store, self.Out, 3, vectorised=model.device.is_cpu)
 
     def _kernel(self, term: Any, store: Any, out: Any, width: int, vectorised: bool) -> Any:
         model = self.model

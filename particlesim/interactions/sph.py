@@ -99,13 +99,13 @@ class SPH(Interaction):
             self.name, "smoothing_length", smoothing_length, above=0.0, unit="length"
         )
         self.cutoff = SUPPORT * h
-        self.equation_of_state = _one(
+        self.equation_of_state = _of_kind(
             self.name, "equation_of_state", equation_of_state, EquationOfState,
-            "Tait(sound_speed=...)",
+            "Tait(sound_speed)",
         )  # fmt: skip
         self.viscosity = viscosity
         if viscosity is not None:
-            _one(self.name, "viscosity", viscosity, Viscosity, "ArtificialViscosity(alpha)")
+            _of_kind(self.name, "viscosity", viscosity, Viscosity, "ArtificialViscosity(0.05)")
         validate.choice(self.name, "smoothing", smoothing, SMOOTHING)
         functions = SMOOTHING[smoothing]
         if dimension not in functions:
@@ -282,10 +282,11 @@ class SPH(Interaction):
         return interpolate(self.bound, points, field, world, normalized)
 
 
-def _one(owner: str, argument: str, value: Any, kind: type, example: str) -> Any:
+def _of_kind(owner: str, argument: str, value: Any, kind: type, example: str) -> Any:
     """``value``, checked to be of this kind."""
     if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
         raise TypeError(
-            f"{owner}: {argument} must be one of {kind.__name__}, got {value!r}; give {example}."
+            f"{owner}: {argument} must be {article} {kind.__name__}, got {value!r}; give {example}."
         )
     return value

@@ -76,11 +76,7 @@ class Springs(Interaction):
     def _lengths(self, model: Model, w: int) -> np.ndarray:
         if self.rest_length is not None:
             return self.rest_length
-        scene = model.scenes[w]
-        d = scene.position[self.pairs[:, 1]] - scene.position[self.pairs[:, 0]]
-        length = model.box_length[w]
-        wrapped = np.divide(d, length, out=np.zeros_like(d), where=length > 0)
-        return np.linalg.norm(d - length * np.round(wrapped), axis=1)
+        return topology.distances(model, w, self.pairs)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         force, _ = kernels.spring_kernels(self.model.precision, self.model.periodic)
