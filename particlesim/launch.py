@@ -14,6 +14,7 @@ import os
 import queue
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -214,6 +215,28 @@ def _capture(parts: Sequence[Program], device: Any) -> Any:
     return capture.graph
 
 
+class EagerExecutor:
+    """Runs a frame launch by launch, as it would be without any recording.
+
+    The way out where a driver cannot capture a frame, conditional parts above all: slower, since
+    the host looks at every flag, but the same.
+    """
+
+    name = "eager"
+
+    def __init__(self, frame: Frame):
+        self.frame = frame
+
+    def run(self) -> None:
+        self.frame.before.issue()
+        for _ in range(self.frame.repeat):
+            self.frame.substep.issue()
+        self.frame.after.issue()
+
+    def close(self) -> None:
+        """Nothing to end."""
+
+
 class ThreadExecutor:
     """Replays a frame launch by launch, each cut into chunks over CPU threads."""
 
@@ -280,6 +303,9 @@ class ThreadExecutor:
         self.close()
 
 
+AnyExecutor = GraphExecutor | EagerExecutor | ThreadExecutor
+
+
 class Executor:
     """Runs frames by graph or threads: as set, or whichever has measured faster.
 
@@ -291,9 +317,9 @@ class Executor:
     def __init__(self, frame: Frame, settings: Settings, device: Any):
         self.frame, self.device = frame, device
         self.threads = settings.threads or available_threads()
-        self.chosen: GraphExecutor | ThreadExecutor | None = None
+        self.chosen: AnyExecutor | None = None
         self._times: dict[str, list[float]] = {"graph": [], "threads": []}
-        self._tried: dict[str, GraphExecutor | ThreadExecutor] = {}
+        self._tried: dict[str, AnyExecutor] = {}
         way = settings.execution
         small = self.threads == 1 or frame.largest < 2 * CHUNK
         if not device.is_cpu or (way == "auto" and small):
@@ -301,10 +327,20 @@ class Executor:
         if way != "auto":
             self.chosen = self._make(way)
 
-    def _make(self, way: str) -> GraphExecutor | ThreadExecutor:
-        if way == "graph":
+    def _make(self, way: str) -> AnyExecutor:
+        if way == "threads":
+            return ThreadExecutor(self.frame, self.threads)
+        try:
             return GraphExecutor(self.frame, self.device)
-        return ThreadExecutor(self.frame, self.threads)
+        except RuntimeError as error:
+            if self.device.is_cpu:
+                raise
+            warnings.warn(
+                f"Simulation: {self.device} cannot capture a frame ({error}); running it launch "
+                "by launch, which is slower.",
+                stacklevel=2,
+            )
+            return EagerExecutor(self.frame)
 
     def run(self) -> None:
         """Run one frame."""

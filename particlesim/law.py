@@ -21,6 +21,11 @@ class Law:
     def __init__(self, func: Callable[..., Any]):
         functools.update_wrapper(self, func)
         self.func = func
+        if func.__name__ == "<lambda>" or not _has_source(func):
+            raise TypeError(
+                f"law: func must be a def in a file or notebook, got {func!r}; Warp reads its "
+                "source."
+            )
         signature = inspect.signature(func, eval_str=True)
         self.parameters: dict[str, Any] = {}
         self.defaults: dict[str, Any] = {}
@@ -47,19 +52,38 @@ class Law:
         """The Warp function in ``precision``, translated on first use."""
         if precision.name not in self._functions:
             self._functions[precision.name] = translate(
-                self.func,
-                precision,
-                lambda value: value.function(precision) if isinstance(value, Law) else value,
+                self.func, precision, lambda value: _helper(value, precision)
             )
         return self._functions[precision.name]
+
+
+def _helper(value: Any, precision: Precision) -> Any:
+    """What a law that names ``value`` calls: other laws, and Warp functions read as laws."""
+    if isinstance(value, wp.Function) and value.func is not None and value.native_snippet is None:
+        value = _law_of(value.func)
+    return value.function(precision) if isinstance(value, Law) else value
+
+
+def _has_source(func: Callable[..., Any]) -> bool:
+    try:
+        return bool(inspect.getsource(func))
+    except (OSError, TypeError):
+        return False
+
+
+@functools.cache
+def _law_of(func: Callable[..., Any]) -> Law:
+    """One law for one function, so that a kernel does not get it twice."""
+    return Law(func)
 
 
 def law(func: Callable[..., Any]) -> Law:
     """Declare a law: a function of floats and vectors, written once for both precisions.
 
     The body is Warp's subset of Python (``wp.sqrt``, ``wp.length``, branches, loops). Float
-    literals, ``float`` and ``wp.vec3`` take the precision of the simulation. A law may call other
-    laws. What the first parameters mean is up to who uses the law (see ``PairForce``,
+    literals, ``float`` and ``wp.vec3`` take the precision of the simulation, and so do the numbers
+    and vectors that it names outside itself; a number that meets them is written ``2.0``, not
+    ``2``. ``int`` parameters stay whole. A law may call other laws and Warp functions. What the first parameters mean is up to who uses the law (see ``PairForce``,
     ``ParticleForce``, ``Constraint``); the others are given by keyword there.
 
     Example:
@@ -71,6 +95,8 @@ def law(func: Callable[..., Any]) -> Law:
     """
     if isinstance(func, Law):
         return func
-    if not callable(func):
+    if isinstance(func, wp.Function) and func.func is not None:
+        func = func.func
+    if not inspect.isfunction(func):
         raise TypeError(f"law: func must be a function, got {func!r}; decorate a def.")
     return Law(func)

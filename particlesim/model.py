@@ -18,15 +18,15 @@ from .settings import Settings
 def choose_device(device: Any) -> Any:
     """The Warp device of that name; None: CUDA where there is one, else the CPU."""
     wp.init()
+    cuda = wp.is_cuda_available()
     if device is None:
-        return wp.get_device("cuda:0" if wp.is_cuda_available() else "cpu")
-    try:
-        return wp.get_device(device)
-    except (ValueError, RuntimeError):
-        there = [str(d) for d in wp.get_devices()]
-        raise validate.fail(
-            "Simulation", "device", f"be one of {', '.join(there)}", str(device), "choose one"
-        ) from None
+        return wp.get_device("cuda:0" if cuda else "cpu")
+    there = [each.alias for each in wp.get_devices()]
+    if str(device) in there or (cuda and str(device) == "cuda"):
+        return wp.get_device(str(device))
+    raise validate.fail(
+        "Simulation", "device", f"be one of {', '.join(there)}", str(device), "choose one"
+    )
 
 
 def select(scene: Scene, group: Any, owner: str) -> np.ndarray:
@@ -75,9 +75,24 @@ class Model:
         self.world_of = np.repeat(np.arange(self.world_count), counts)
         self.periodic = self._periodicity()
         self.box = self._boxes()
-        self.attributes: dict[str, int | None] = {}
-        for scene in self.scenes:
-            self.attributes.update(scene.attributes)
+        self.attributes = self._attributes()
+
+    @property
+    def vectorised(self) -> bool:
+        """Loops over pairs are C++ for the CPU's vector units, rather than Warp's own."""
+        return bool(self.device.is_cpu)
+
+    def _attributes(self) -> dict[str, int | None]:
+        result: dict[str, int | None] = {}
+        for w, scene in enumerate(self.scenes):
+            for name, width in scene.attributes.items():
+                if result.setdefault(name, width) != width:
+                    raise validate.fail(
+                        "Simulation", f"scenes[{w}].{name}",
+                        f"be {'numbers' if width else 'vectors'} as in the scenes before",
+                        "vectors" if width else "numbers", "make a batch of scenes of one kind",
+                    )  # fmt: skip
+        return result
 
     def _periodicity(self) -> Periodicity:
         kinds = {scene.periodic[2] if scene.periodic else (False,) * 3 for scene in self.scenes}
@@ -113,12 +128,14 @@ class Model:
     def parameters(self, name: str, columns: dict[str, np.ndarray]) -> tuple[Any, wp.array]:
         """A parameter struct and its array, one entry a world or an item.
 
-        Columns are (count,) numbers or (count, 3) vectors.
+        Columns are (count,) numbers, whole if they are integers, or (count, 3) vectors.
         """
+        precision = self.precision
         kinds = {
-            key: self.precision.vec3 if np.ndim(column) == 2 else self.precision.scalar
+            key: wp.int32 if np.issubdtype(column.dtype, np.integer)
+            else precision.vec3 if np.ndim(column) == 2 else precision.scalar
             for key, column in columns.items()
-        }
+        }  # fmt: skip
         kind = parameter_struct(name, tuple(kinds.items()))
         return kind, self.structures(kind, columns)
 

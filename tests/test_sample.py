@@ -291,3 +291,27 @@ def test_bad_arguments(call, message):
     with pytest.raises(ValueError, match=message) as raised:
         call()
     assert ", got " in str(raised.value) and str(raised.value).endswith(".")
+
+
+def test_links_are_the_pairs_within_reach():
+    # Brute force on a jittered lattice; a cube of n^3 has 13 directions of neighbours.
+    points = sample.box((0, 0, 0), (5, 5, 5), 1.0)
+    pairs = sample.links(points, 1.8)
+    n = 5
+    edges, faces, corners = 3 * n * n * (n - 1), 6 * n * (n - 1) ** 2, 4 * (n - 1) ** 3
+    assert len(pairs) == edges + faces + corners
+    jittered = sample.random((-3, 0, 2), (4, 1, 9), 200, seed=3)
+    d = np.linalg.norm(jittered[:, None] - jittered[None], axis=2)
+    expected = np.argwhere(np.triu(d <= 1.1, k=1))
+    np.testing.assert_array_equal(sample.links(jittered, 1.1), expected)
+    assert sample.links(np.zeros((0, 3)), 1.0).shape == (0, 2)
+
+
+def test_rotate_keeps_the_axis_and_turns_right_handed():
+    x = np.array([(1.0, 0, 0), (0, 0, 2.0), (3.0, 4.0, 5.0)])
+    turned = sample.rotate(x, (0, 0, 2), np.pi / 2)
+    np.testing.assert_allclose(turned, [(0, 1, 0), (0, 0, 2), (-4, 3, 5)], atol=1e-15)
+    back = sample.rotate(turned, (0, 0, 1), -np.pi / 2)
+    np.testing.assert_allclose(back, x, atol=1e-15)
+    with pytest.raises(ValueError, match=r"^sample\.rotate: axis must have a length, got"):
+        sample.rotate(x, (0, 0, 0), 1.0)

@@ -100,8 +100,7 @@ class Interaction(Bindable):
     def columns(self, names: Mapping[str, Any]) -> dict[str, np.ndarray]:
         """Parameters of all worlds, one row a world."""
         return {
-            name: np.array([peer.parameters[name] for peer in self.peers], dtype=np.float64)
-            for name in names
+            name: np.array([peer.parameters[name] for peer in self.peers]) for name in names
         }
 
 
@@ -135,7 +134,7 @@ class Arguments:
             suffix = next((s for s in suffixes if s and name.endswith(s)), "")
             base = name[: len(name) - len(suffix)]
             if name in given:
-                self.values[name] = _value(owner, name, given[name])
+                self.values[name] = self._value(name, given[name])
                 self.sources.append(("parameter", name))
             elif name in extra:
                 self.sources.append(("extra", name))
@@ -143,7 +142,7 @@ class Arguments:
                 self.quantities.add(base)
                 self.sources.append((f"quantity{suffix}", base))
             elif name in law.defaults:
-                self.values[name] = _value(owner, name, law.defaults[name])
+                self.values[name] = self._value(name, law.defaults[name])
                 self.sources.append(("parameter", name))
             else:
                 raise validate.fail(
@@ -179,8 +178,9 @@ class Arguments:
                 text.append(f"d.{field}[{index[kind.removeprefix('quantity')]}]")
         return text
 
-
-def _value(owner: str, name: str, value: Any) -> Any:
-    if np.ndim(value) == 0:
-        return validate.number(owner, name, value)
-    return validate.vector(owner, name, value)
+    def _value(self, name: str, value: Any) -> Any:
+        if self.law.parameters[name] is int:
+            return validate.whole(self.owner, name, value, minimum=-(2**31))
+        if np.ndim(value) == 0:
+            return validate.number(self.owner, name, value)
+        return validate.vector(self.owner, name, value)

@@ -1,0 +1,311 @@
+"""Contacts of particles: gathered over the neighbours and averaged, so that no valence explodes.
+
+The pair passes read copies in slot order and write the state: Jacobi, whatever the order of the
+threads. Averaging is by mass splitting (Tonge, Benevolenski and Voroshilov 2012): a particle with
+n contacts counts n times as light in each, which keeps corrections opposite and equal.
+"""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from .constraints import bodies_type, place_function
+from .easing import ease_function, easing_type
+from .loops import Pairs, Periodicity, box_type, minimum_image
+from .precision import Precision, function, register, structure
+
+
+@functools.cache
+def contact_types(precision: Precision) -> tuple[Any, Any]:
+    """Slot-ordered copies, and what the count of contacts writes."""
+    vec3, real = precision.vec3, precision.scalar
+    data = {
+        "x": wp.array(dtype=vec3),
+        "radius": wp.array(dtype=real),  # less the slack
+        "share": wp.array(dtype=real),  # n w
+        "way": wp.array(dtype=vec3),  # of this substep; for bounces the velocity that it began with
+        "v": wp.array(dtype=vec3),  # for bounces
+        "inverse_dt_squared": real,
+    }
+    shares = {"share": wp.array(dtype=real), "w": wp.array(dtype=real), "relaxation": real}
+    return (
+        structure(f"ContactData_{precision.name}", data),
+        structure(f"ContactShares_{precision.name}", shares),
+    )
+
+
+@functools.cache
+def slack_kernels(precision: Precision, periodic: Periodicity) -> tuple[wp.Kernel, wp.Kernel]:
+    """Kernels: the slack that leaves no pair overlapping, of marked worlds; and its running out.
+
+    A particle's radius shrinks by the factor r / (R_i + R_j) of its worst pair: no two overlap
+    then, since neither factor is larger than that of their own pair.
+    """
+    vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
+    Bodies, Easing = bodies_type(precision), easing_type(precision)
+    image, ease = minimum_image(precision, periodic), ease_function(precision)
+
+    @register
+    def measure_slack(
+        first: int,
+        pairs: Pairs,
+        box: wp.array(dtype=Box),
+        marked: wp.array(dtype=wp.int32),
+        b: Bodies,
+        radius: wp.array(dtype=real),
+        dt: real,
+        slack_out: wp.array(dtype=real),
+    ):
+        s = first + wp.tid()
+        world = pairs.world[s]
+        if marked[world] == 0:
+            return
+        i = pairs.order[s]
+        x_i = b.x[i] - b.v[i] * dt  # where the substep began: the way since is no overlap
+        factor = real(1.0)
+        row = wp.int64(s) * pairs.row_stride
+        for k in range(wp.min(pairs.count[s], pairs.capacity)):
+            j = pairs.order[pairs.index[row + wp.int64(k) * pairs.entry_stride]]
+            reach = radius[i] + radius[j]
+            r = wp.length(image(x_i - (b.x[j] - b.v[j] * dt), box[world]))
+            if r < factor * reach and b.w[i] + b.w[j] > real(0.0):
+                factor = r / reach
+        slack_out[i] = radius[i] * (real(1.0) - factor)
+
+    @register
+    def run_out(
+        first: int,
+        pairs: Pairs,
+        radius: wp.array(dtype=real),
+        easing: Easing,
+        dt: real,
+        slack_io: wp.array(dtype=real),
+    ):
+        i = pairs.order[first + wp.tid()]
+        if slack_io[i] > real(0.0):
+            slack_io[i] = ease(slack_io[i], radius[i], dt, easing)
+
+    return measure_slack, run_out
+
+
+@functools.cache
+def gather_kernel(precision: Precision, compensated: bool, friction: bool) -> wp.Kernel:
+    """Kernel: positions, radii and ways into slot order.
+
+    With compensated sums the positions are taken from a particle of the same world: differences
+    far from the origin are then as exact as near to it.
+    """
+    real = precision.scalar
+    Bodies, (Data, _) = bodies_type(precision), contact_types(precision)
+
+    @register
+    def gather_contacts(
+        first: int,
+        pairs: Pairs,
+        b: Bodies,
+        radius: wp.array(dtype=real),
+        slack: wp.array(dtype=real),
+        eased: real,
+        dt: real,
+        follow: real,
+        d_out: Data,
+    ):
+        s = first + wp.tid()
+        i = pairs.order[s]
+        x = b.x[i]
+        if wp.static(compensated):
+            o = pairs.order[pairs.begin[pairs.world[s]]]
+            x = (x - b.x[o]) + (b.x_error[i] - b.x_error[o])
+        d_out.x[s] = x
+        d_out.radius[s] = radius[i] - eased * slack[i]
+        if wp.static(friction):
+            d_out.way[s] = b.v[i] * dt + b.correction[i] * follow
+
+    return gather_contacts
+
+
+@functools.cache
+def gather_bounce_kernel(precision: Precision, compensated: bool, forces: bool) -> wp.Kernel:
+    """Kernel: for a bounce, positions after integration and velocities as the substep began."""
+    vec3, real = precision.vec3, precision.scalar
+    Bodies, (Data, _) = bodies_type(precision), contact_types(precision)
+
+    @register
+    def gather_bounces(
+        first: int,
+        pairs: Pairs,
+        b: Bodies,
+        f: wp.array(dtype=vec3),
+        radius: wp.array(dtype=real),
+        slack: wp.array(dtype=real),
+        dt: real,
+        inverse_dt: real,
+        d_out: Data,
+    ):
+        s = first + wp.tid()
+        i = pairs.order[s]
+        x = b.x[i] - b.correction[i]
+        if wp.static(compensated):
+            o = pairs.order[pairs.begin[pairs.world[s]]]
+            x = (b.x[i] - b.x[o]) + (b.x_error[i] - b.x_error[o]) - b.correction[i]
+        d_out.x[s] = x
+        d_out.radius[s] = radius[i] - slack[i]
+        v = b.v[i]
+        d_out.v[s] = v
+        v = v - b.correction[i] * inverse_dt
+        if wp.static(forces):
+            v = v - f[i] * (b.w[i] * dt)
+        d_out.way[s] = v
+
+    return gather_bounces
+
+
+@functools.cache
+def _separation_function(precision: Precision) -> wp.Function:
+    """Distance and direction of a pair, also of a coincident one, without a branch.
+
+    Coincident particles get one of eight directions by the difference of their slots: opposite for
+    the two, the same in a batch as alone, and not all in one line.
+    """
+    vec3, real = precision.vec3, precision.scalar
+
+    def separation(i: int, j: int, x_ij: vec3, r2: real, closest_squared: real):
+        apart = r2 > closest_squared
+        r = wp.sqrt(wp.where(apart, r2, closest_squared))
+        k = wp.abs(i - j)
+        side = wp.where(apart, real(0.0), wp.where(i < j, real(-1.0), real(1.0)))
+        a = wp.where((k & 1) == 0, real(0.48), real(-0.48))
+        b = wp.where((k & 2) == 0, real(0.6), real(-0.6))
+        c = wp.where((k & 4) == 0, real(0.64), real(-0.64))
+        n = x_ij * (wp.where(apart, real(1.0), real(0.0)) / r) + vec3(a, b, c) * side
+        return r, n
+
+    return function(separation)
+
+
+@functools.cache
+def count_term(precision: Precision, params: Any) -> wp.Function:
+    """Term: 1 for a pair in contact."""
+    vec3, real, one = precision.vec3, precision.scalar, precision.vector(1)
+    Data, _ = contact_types(precision)
+
+    def touching(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
+        reach = d.radius[i] + d.radius[j]
+        return one(wp.where(r2 < reach * reach, real(1.0), real(0.0)))
+
+    return function(touching)
+
+
+@functools.cache
+def bounce_count_term(precision: Precision, params: Any) -> wp.Function:
+    """Term: 1 for a pair in contact that approached as the substep began."""
+    vec3, real, one = precision.vec3, precision.scalar, precision.vector(1)
+    Data, _ = contact_types(precision)
+
+    def hitting(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
+        reach = d.radius[i] + d.radius[j]
+        hit = (r2 < reach * reach) & (wp.dot(x_ij, d.way[i] - d.way[j]) < real(0.0))
+        return one(wp.where(hit, real(1.0), real(0.0)))
+
+    return function(hitting)
+
+
+@functools.cache
+def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Function:
+    """Term: multiplier times direction of a pair's correction.
+
+    lam = (R_i + R_j - r) / (n_i w_i + n_j w_j + alpha~) along the normal; friction takes back the
+    tangential way of the substep, with at most mu lam (Macklin et al. 2014, eq. 24).
+    """
+    vec3, real = precision.vec3, precision.scalar
+    Data, _ = contact_types(precision)
+    separation = _separation_function(precision)
+
+    def push(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
+        r, n = separation(i, j, x_ij, r2, p.closest_squared)
+        overlap = d.radius[i] + d.radius[j] - r
+        share = d.share[i] + d.share[j]
+        soft = share + p.compliance * d.inverse_dt_squared
+        active = (overlap > real(0.0)) & (share > real(0.0))
+        lam = wp.where(active, overlap, real(0.0)) / wp.where(active, soft, real(1.0))
+        result = n * lam
+        if wp.static(friction):
+            u = d.way[i] - d.way[j]
+            t = u - n * wp.dot(u, n)
+            length = wp.sqrt(wp.dot(t, t))
+            stick = length <= p.friction * lam * share
+            grip = wp.where(
+                stick,
+                wp.where(active, real(1.0), real(0.0)) / wp.where(active, share, real(1.0)),
+                p.friction * lam / wp.where(stick, real(1.0), length),
+            )
+            result = result - t * grip
+        return result
+
+    return function(push)
+
+
+@functools.cache
+def bounce_term(precision: Precision, params: Any) -> wp.Function:
+    """Term: impulse that sends a pair off at e times the speed it approached with.
+
+    Mueller et al. (2020), eq. 34; the speed is that before the forces of the substep, so that
+    what rests under gravity does not bounce.
+    """
+    vec3, real = precision.vec3, precision.scalar
+    Data, _ = contact_types(precision)
+    separation = _separation_function(precision)
+
+    def bounce(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
+        _r, n = separation(i, j, x_ij, r2, p.closest_squared)
+        reach = d.radius[i] + d.radius[j]
+        share = d.share[i] + d.share[j]
+        before = wp.dot(d.way[i] - d.way[j], n)
+        missing = -p.restitution * before - wp.dot(d.v[i] - d.v[j], n)
+        hit = (r2 < reach * reach) & (before < real(0.0)) & (missing > real(0.0))
+        hit = hit & (share > real(0.0))
+        return n * (wp.where(hit, missing, real(0.0)) / wp.where(hit, share, real(1.0)))
+
+    return function(bounce)
+
+
+@functools.cache
+def store_share(precision: Precision, params: Any) -> wp.Function:
+    """Store: n w, over the relaxation."""
+    one = precision.vector(1)
+    Data, Shares = contact_types(precision)
+
+    def keep_share(i: int, particle: int, total: one, d: Data, p: params, o: Shares):
+        o.share[i] = o.w[particle] * total[0] / o.relaxation
+
+    return function(keep_share)
+
+
+@functools.cache
+def store_correction(precision: Precision, params: Any, compensated: bool) -> wp.Function:
+    """Store: x += w sum, and the same into the correction."""
+    vec3, real = precision.vec3, precision.scalar
+    (Data, _), Bodies = contact_types(precision), bodies_type(precision)
+    place = place_function(precision, compensated)
+
+    def correct(i: int, particle: int, total: vec3, d: Data, p: params, o: Bodies):
+        if wp.dot(total, total) > real(0.0):
+            e = vec3()
+            if wp.static(compensated):
+                e = o.x_error[particle]
+            place(particle, o.x[particle], e, total * o.w[particle], o)
+
+    return function(correct)
+
+
+@functools.cache
+def store_impulse(precision: Precision, params: Any) -> wp.Function:
+    """Store: v += w sum."""
+    vec3 = precision.vec3
+    (Data, _), Bodies = contact_types(precision), bodies_type(precision)
+
+    def kick(i: int, particle: int, total: vec3, d: Data, p: params, o: Bodies):
+        o.v[particle] = o.v[particle] + total * o.w[particle]
+
+    return function(kick)
