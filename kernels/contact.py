@@ -2,7 +2,10 @@
 
 The pair passes read copies in slot order and write the state: Jacobi, whatever the order of the
 threads. Averaging is by mass splitting (Tonge, Benevolenski and Voroshilov 2012): a particle with
-n contacts counts n times as light in each, which keeps corrections opposite and equal.
+n contacts counts as n times as light in each, which keeps corrections opposite and equal. Instead
+of n, the largest eigenvalue of the sum of n n^T over the normals is enough for corrections that
+never overshoot (the sum of lam n is then bounded by what is split); it is n for contacts in a line
+and n/3 for contacts all around.
 """
 
 import functools
@@ -23,12 +26,19 @@ def contact_types(precision: Precision) -> tuple[Any, Any]:
     data = {
         "x": wp.array(dtype=vec3),
         "radius": wp.array(dtype=real),  # less the slack
-        "share": wp.array(dtype=real),  # n w
+        "share": wp.array(dtype=real),  # w times the crowding of normals
+        "grip": wp.array(dtype=real),  # w times the number of contacts, for friction
         "way": wp.array(dtype=vec3),  # of this substep; for bounces the velocity that it began with
         "v": wp.array(dtype=vec3),  # for bounces
         "inverse_dt_squared": real,
     }
-    shares = {"share": wp.array(dtype=real), "w": wp.array(dtype=real), "relaxation": real}
+    shares = {
+        "share": wp.array(dtype=real),
+        "grip": wp.array(dtype=real),
+        "w": wp.array(dtype=real),
+        "relaxation": real,
+        "grips": wp.int32,
+    }
     return (
         structure(f"ContactData_{precision.name}", data),
         structure(f"ContactShares_{precision.name}", shares),
@@ -185,38 +195,64 @@ def _separation_function(precision: Precision) -> wp.Function:
 
 
 @functools.cache
-def count_term(precision: Precision, params: Any) -> wp.Function:
-    """Term: 1 for a pair in contact."""
-    vec3, real, one = precision.vec3, precision.scalar, precision.vector(1)
+def crowding_term(precision: Precision, params: Any, bounce: bool) -> wp.Function:
+    """Term: n n^T of a pair in contact, as its six entries; bounce: that approached at first."""
+    vec3, real, six = precision.vec3, precision.scalar, precision.vector(6)
     Data, _ = contact_types(precision)
+    separation = _separation_function(precision)
 
-    def touching(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
-        reach = d.radius[i] + d.radius[j]
-        return one(wp.where(r2 < reach * reach, real(1.0), real(0.0)))
+    def crowding(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
+        r, n = separation(i, j, x_ij, r2, p.closest_squared)
+        weight = wp.where(r < d.radius[i] + d.radius[j], real(1.0), real(0.0))
+        if wp.static(bounce):
+            approach = wp.dot(n, d.way[i] - d.way[j])
+            weight = wp.where(approach < real(0.0), weight, real(0.0))
+        m = n * weight
+        return six(m[0] * n[0], m[0] * n[1], m[0] * n[2], m[1] * n[1], m[1] * n[2], m[2] * n[2])
 
-    return function(touching)
+    return function(crowding)
 
 
 @functools.cache
-def bounce_count_term(precision: Precision, params: Any) -> wp.Function:
-    """Term: 1 for a pair in contact that approached as the substep began."""
-    vec3, real, one = precision.vec3, precision.scalar, precision.vector(1)
-    Data, _ = contact_types(precision)
+def largest_eigenvalue(precision: Precision) -> wp.Function:
+    """An upper bound of the largest eigenvalue of a positive symmetric matrix of six entries.
 
-    def hitting(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
-        reach = d.radius[i] + d.radius[j]
-        hit = (r2 < reach * reach) & (wp.dot(x_ij, d.way[i] - d.way[j]) < real(0.0))
-        return one(wp.where(hit, real(1.0), real(0.0)))
+    (sum lambda^8)^(1/8), by squaring twice: exact for one direction, at most 15 % too much.
+    """
+    real, six = precision.scalar, precision.vector(6)
 
-    return function(hitting)
+    def squared(t: six):
+        return six(
+            t[0] * t[0] + t[1] * t[1] + t[2] * t[2],
+            t[0] * t[1] + t[1] * t[3] + t[2] * t[4],
+            t[0] * t[2] + t[1] * t[4] + t[2] * t[5],
+            t[1] * t[1] + t[3] * t[3] + t[4] * t[4],
+            t[1] * t[2] + t[3] * t[4] + t[4] * t[5],
+            t[2] * t[2] + t[4] * t[4] + t[5] * t[5],
+        )
+
+    square = function(squared)
+
+    def bound(t: six):
+        trace = t[0] + t[3] + t[5]
+        result = trace
+        if trace > real(0.0):
+            q = square(square(t / trace))
+            off = q[1] * q[1] + q[2] * q[2] + q[4] * q[4]
+            norm = q[0] * q[0] + q[3] * q[3] + q[5] * q[5] + real(2.0) * off
+            result = trace * wp.sqrt(wp.sqrt(wp.sqrt(norm)))
+        return result
+
+    return function(bound)
 
 
 @functools.cache
 def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Function:
     """Term: multiplier times direction of a pair's correction.
 
-    lam = (R_i + R_j - r) / (n_i w_i + n_j w_j + alpha~) along the normal; friction takes back the
-    tangential way of the substep, with at most mu lam (Macklin et al. 2014, eq. 24).
+    lam = (R_i + R_j - r) / (c_i w_i + c_j w_j + alpha~) along the normal, c the crowding; friction
+    takes back the tangential way of the substep, split n ways, with at most mu lam (Macklin et al.
+    2014, eq. 24).
     """
     vec3, real = precision.vec3, precision.scalar
     Data, _ = contact_types(precision)
@@ -227,19 +263,16 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
         overlap = d.radius[i] + d.radius[j] - r
         share = d.share[i] + d.share[j]
         soft = share + p.compliance * d.inverse_dt_squared
-        active = (overlap > real(0.0)) & (share > real(0.0))
+        active = overlap > real(0.0) and share > real(0.0)
         lam = wp.where(active, overlap, real(0.0)) / wp.where(active, soft, real(1.0))
         result = n * lam
         if wp.static(friction):
             u = d.way[i] - d.way[j]
             t = u - n * wp.dot(u, n)
             length = wp.sqrt(wp.dot(t, t))
-            stick = length <= p.friction * lam * share
-            grip = wp.where(
-                stick,
-                wp.where(active, real(1.0), real(0.0)) / wp.where(active, share, real(1.0)),
-                p.friction * lam / wp.where(stick, real(1.0), length),
-            )
+            split = wp.max(d.grip[i] + d.grip[j], real(1.0e-30))
+            limit = p.friction * lam / wp.max(length, real(1.0e-30))
+            grip = wp.min(real(1.0) / split, limit)
             result = result - t * grip
         return result
 
@@ -263,8 +296,8 @@ def bounce_term(precision: Precision, params: Any) -> wp.Function:
         share = d.share[i] + d.share[j]
         before = wp.dot(d.way[i] - d.way[j], n)
         missing = -p.restitution * before - wp.dot(d.v[i] - d.v[j], n)
-        hit = (r2 < reach * reach) & (before < real(0.0)) & (missing > real(0.0))
-        hit = hit & (share > real(0.0))
+        touching = r2 < reach * reach and share > real(0.0)
+        hit = touching and before < real(0.0) and missing > real(0.0)
         return n * (wp.where(hit, missing, real(0.0)) / wp.where(hit, share, real(1.0)))
 
     return function(bounce)
@@ -272,12 +305,16 @@ def bounce_term(precision: Precision, params: Any) -> wp.Function:
 
 @functools.cache
 def store_share(precision: Precision, params: Any) -> wp.Function:
-    """Store: n w, over the relaxation."""
-    one = precision.vector(1)
+    """Store: crowding times w, over the relaxation; and for friction the number of contacts."""
+    real, six = precision.scalar, precision.vector(6)
     Data, Shares = contact_types(precision)
+    eigenvalue = largest_eigenvalue(precision)
 
-    def keep_share(i: int, particle: int, total: one, d: Data, p: params, o: Shares):
-        o.share[i] = o.w[particle] * total[0] / o.relaxation
+    def keep_share(i: int, particle: int, total: six, d: Data, p: params, o: Shares):
+        w = o.w[particle] / o.relaxation
+        o.share[i] = eigenvalue(total) * w
+        if o.grips != 0:
+            o.grip[i] = (total[0] + total[3] + total[5]) * w
 
     return function(keep_share)
 
@@ -290,7 +327,8 @@ def store_correction(precision: Precision, params: Any, compensated: bool) -> wp
     place = place_function(precision, compensated)
 
     def correct(i: int, particle: int, total: vec3, d: Data, p: params, o: Bodies):
-        if wp.dot(total, total) > real(0.0):
+        touched = total[0] != real(0.0) or total[1] != real(0.0) or total[2] != real(0.0)
+        if touched:
             e = vec3()
             if wp.static(compensated):
                 e = o.x_error[particle]

@@ -1,7 +1,14 @@
 """particlesim: a general particle-physics framework on NVIDIA Warp."""
 
 from . import sample
-from .constraints import Constraint, ConstraintForce, Distance
+from .constraints import (
+    BoxBoundary,
+    Constraint,
+    ConstraintForce,
+    Contact,
+    Distance,
+    PlaneBoundary,
+)
 from .errors import SimulationError
 from .interactions import (
     SPH,
@@ -30,9 +37,11 @@ __version__ = "0.1.0"
 __all__ = [
     "SPH",
     "ArtificialViscosity",
+    "BoxBoundary",
     "ConstantForce",
     "Constraint",
     "ConstraintForce",
+    "Contact",
     "Distance",
     "Drag",
     "Gravity",
@@ -43,6 +52,7 @@ __all__ = [
     "PairForce",
     "PairPotential",
     "ParticleForce",
+    "PlaneBoundary",
     "Polytrope",
     "Scene",
     "Settings",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .kernels.integrate import integration_kernels, motion_type
+from .kernels.integrate import integration_kernels, motion_type, tick_kernel
 from .launch import launch
 from .model import Model
 from .state import State
@@ -18,7 +18,7 @@ class Integrator:
     carries_forces = False  # a substep starts from the forces that the last one ended with
 
     def __init__(self, model: Model, state: State, *, constrained: bool, remember: bool):
-        self.model, self.count = model, model.particle_count
+        self.model, self.state, self.count = model, state, model.particle_count
         settings = model.settings
         forces = "force" in state
         names = {"position", "velocity"}
@@ -54,6 +54,13 @@ class Integrator:
         if self.constrained and dt > 0:
             self._launch(self.kernels.follow_corrections, 1.0 / dt)
 
+    def _move(self, dt_kick: float, dt: float) -> None:
+        """v += w f dt_kick; x += v dt. The clock goes with the positions."""
+        self._launch(self.kernels.advance, dt_kick, dt)
+        if "time" in self.state:
+            model = self.model
+            launch(tick_kernel(), model.world_count, [dt, self.state.time], model.device)
+
     def _launch(self, kernel: Any, *scalars: float) -> None:
         launch(kernel, self.count, [*scalars, self.motion], self.model.device)
 
@@ -64,7 +71,7 @@ class SymplecticEuler(Integrator):
     name, order = "symplectic_euler", 1
 
     def advance(self, dt: float) -> None:
-        self._launch(self.kernels.advance, dt, dt)
+        self._move(dt, dt)
 
 
 class VelocityVerlet(Integrator):
@@ -78,7 +85,7 @@ class VelocityVerlet(Integrator):
     carries_forces = True
 
     def begin(self, dt: float) -> None:
-        self._launch(self.kernels.advance, 0.5 * dt, dt)
+        self._move(0.5 * dt, dt)
 
     def advance(self, dt: float) -> None:
         if self.forces:

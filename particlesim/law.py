@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import ast
 import functools
 import inspect
+import textwrap
 from collections.abc import Callable
 from typing import Any
 
 import warp as wp
 
+from . import validate
 from .kernels.precision import Precision, translate
+
+UNROLLED = 16  # rounds up to which Warp writes a loop out
 
 
 class Law:
@@ -48,6 +53,34 @@ class Law:
         """Name of the function."""
         return self.func.__name__
 
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """The same for laws of the same code and closure, each made anew as they may be."""
+        cells = [cell.cell_contents for cell in self.func.__closure__ or ()]
+        return (
+            self.func.__code__,
+            *(value.key if isinstance(value, Law) else repr(value) for value in cells),
+        )
+
+    def check_derivable(self, owner: str) -> None:
+        """Refuse loops that Warp does not write out: it derives them wrongly, and silently.
+
+        Raises:
+            ValueError: A ``while``, or a ``for`` whose rounds are not known in advance or over 16.
+        """
+        scope = _scope(self.func)
+        for node in ast.walk(ast.parse(textwrap.dedent(inspect.getsource(self.func)))):
+            if isinstance(node, ast.While | ast.For) and not _is_unrolled(node, self.func, scope):
+                raise validate.fail(
+                    owner, f"law {self.name}",
+                    f"loop at most {UNROLLED} rounds known in advance, to be derived",
+                    ast.unparse(node).partition("\n")[0], "unroll it, or give the force itself",
+                )  # fmt: skip
+        for name in {*self.func.__code__.co_names, *self.func.__code__.co_freevars}:
+            helper = _as_law(scope.get(name))
+            if isinstance(helper, Law) and helper.func is not self.func:
+                helper.check_derivable(owner)
+
     def function(self, precision: Precision) -> wp.Function:
         """The Warp function in ``precision``, translated on first use."""
         if precision.name not in self._functions:
@@ -58,10 +91,38 @@ class Law:
 
 
 def _helper(value: Any, precision: Precision) -> Any:
-    """What a law that names ``value`` calls: other laws, and Warp functions read as laws."""
-    if isinstance(value, wp.Function) and value.func is not None and value.native_snippet is None:
-        value = _law_of(value.func)
+    """What a law that names ``value`` calls in ``precision``."""
+    value = _as_law(value)
     return value.function(precision) if isinstance(value, Law) else value
+
+
+def _as_law(value: Any) -> Any:
+    """Warp functions written in Python are read as laws."""
+    if isinstance(value, wp.Function) and value.func is not None and value.native_snippet is None:
+        return _law_of(value.func)
+    return value
+
+
+def _scope(func: Callable[..., Any]) -> dict[str, Any]:
+    """What the names of a function mean that are not its own."""
+    cells = zip(func.__code__.co_freevars, func.__closure__ or (), strict=True)
+    return {**func.__globals__, **{name: cell.cell_contents for name, cell in cells}}
+
+
+def _is_unrolled(node: ast.While | ast.For, func: Callable[..., Any], scope: dict) -> bool:
+    """Whether Warp writes this loop out: a range of known bounds, few rounds and no break."""
+    if isinstance(node, ast.While) or not isinstance(node.iter, ast.Call):
+        return False
+    bounds = []
+    for bound in node.iter.args:
+        value = bound.value if isinstance(bound, ast.Constant) else None
+        if isinstance(bound, ast.Name) and bound.id not in func.__code__.co_varnames:
+            value = scope.get(bound.id)
+        if not isinstance(value, int):
+            return False
+        bounds.append(value)
+    breaks = any(isinstance(inner, ast.Break) for inner in ast.walk(node))
+    return not breaks and len(range(*bounds)) <= UNROLLED
 
 
 def _has_source(func: Callable[..., Any]) -> bool:
@@ -83,8 +144,9 @@ def law(func: Callable[..., Any]) -> Law:
     The body is Warp's subset of Python (``wp.sqrt``, ``wp.length``, branches, loops). Float
     literals, ``float`` and ``wp.vec3`` take the precision of the simulation, and so do the numbers
     and vectors that it names outside itself; a number that meets them is written ``2.0``, not
-    ``2``. ``int`` parameters stay whole. A law may call other laws and Warp functions. What the first parameters mean is up to who uses the law (see ``PairForce``,
-    ``ParticleForce``, ``Constraint``); the others are given by keyword there.
+    ``2``. ``int`` parameters stay whole. A law may call other laws and Warp functions. What the
+    first parameters mean is up to who uses the law (see ``PairForce``, ``ParticleForce``,
+    ``Constraint``); the others are given by keyword there.
 
     Example:
         >>> @law

@@ -116,9 +116,8 @@ class VerletList(AllPairs):
         self.has_direct = bool(small.any())
         self.direct = model.array(small, wp.int32)
         self.sorted = self.sorted or bool(self.grid_worlds)
-        self.capacity = 0
+        self.capacity = self.generation = 0
         self.grids: dict[int, tuple[wp.HashGrid, Any]] = {}
-        self.vectorised = model.device.is_cpu
 
     def widen(self, cutoff: np.ndarray) -> None:
         """Serve a larger cutoff too."""
@@ -194,15 +193,16 @@ class VerletList(AllPairs):
         return self.model.precision.scalar
 
     def _resize(self, capacity: int) -> None:
-        """Rows for ``capacity`` neighbours; contiguous on the CPU, interleaved on CUDA."""
+        """Rows for ``capacity`` neighbours; contiguous if vectorised, else interleaved for CUDA."""
         stride = -(-(capacity + kernels.SPARE) // 16) * 16
         self.capacity = stride - kernels.SPARE
+        self.generation += 1
         self.index = wp.zeros(self.count * stride, dtype=wp.int32, device=self.model.device)
         pairs = self.pairs
         pairs.index, pairs.capacity = self.index, self.capacity
-        on_cpu = self.model.device.is_cpu
-        pairs.row_stride = stride if on_cpu else 1
-        pairs.entry_stride = 1 if on_cpu else max(1, self.count)
+        contiguous = self.model.vectorised
+        pairs.row_stride = stride if contiguous else 1
+        pairs.entry_stride = 1 if contiguous else max(1, self.count)
 
     def mark_all(self) -> None:
         """Have the next update rebuild every world."""
@@ -226,16 +226,25 @@ class VerletList(AllPairs):
              self.x_listed, self.moved, self.any_moved],
             device,
         )  # fmt: skip
-        take = kernels.build_kernels(model.precision).take_positions
         with when(self.any_moved):
-            launch(
-                take,
-                self.count,
-                [self.members, self.world, self.moved, state.position, self.x_listed],
-                device,
-            )
-            self.rebuild()
+            self._take(state)
         self.gather(state, self.names)
+
+    def renew(self, state: State, worlds: list[int]) -> None:
+        """Make the rows of these worlds from the present positions, now and outside a frame."""
+        self.mark(worlds)
+        self._take(state)
+        self.grow()
+
+    def _take(self, state: State) -> None:
+        """Rows of the worlds marked as moved, from the present positions."""
+        launch(
+            kernels.build_kernels(self.model.precision).take_positions,
+            self.count,
+            [self.members, self.world, self.moved, state.position, self.x_listed],
+            self.model.device,
+        )
+        self.rebuild()
 
     def rebuild(self) -> None:
         """Make the rows of the worlds marked as moved from ``x_listed``, and unmark them."""
@@ -262,7 +271,7 @@ class VerletList(AllPairs):
              self.planes],
             device,
         )  # fmt: skip
-        rows = kernels.grid_rows_kernel(model.precision, model.periodic, self.vectorised)
+        rows = kernels.grid_rows_kernel(model.precision, model.periodic, model.vectorised)
         launch(
             rows,
             count,
@@ -275,7 +284,7 @@ class VerletList(AllPairs):
         model = self.model
         spread = kernels.build_kernels(model.precision).spread
         launch(spread, self.count, [self.x_listed, self.planes], model.device)
-        rows = kernels.direct_rows_kernel(model.precision, model.periodic, self.vectorised)
+        rows = kernels.direct_rows_kernel(model.precision, model.periodic, model.vectorised)
         launch(
             rows,
             self.count,
@@ -304,7 +313,7 @@ class VerletList(AllPairs):
         grids = [f"{g._dim_x} x {g._dim_y} x {g._dim_z}" for g, _ in self.grids.values()]
         how = f"hash grid {grids[0]}" if grids else "direct search"
         how += f" and {len(grids) - 1} more" if len(grids) > 1 else ""
-        mean = float(np.minimum(self.pairs.count.numpy(), self.capacity).mean())
+        mean = np.minimum(self.pairs.count.numpy(), self.capacity).sum() / max(1, self.count)
         return (
             f"within {self.reach.max():g} of {self.count} particles, {mean:.0f} neighbours on "
             f"average, room for {self.capacity}, {how}, for {', '.join(self.users)}"
@@ -390,6 +399,16 @@ class Neighbors:
         for each in self.lists:
             if each.for_constraints:
                 each.update(state)
+
+    def renew(self, state: State, worlds: list[int]) -> None:
+        """The positions of these worlds were written from outside: make their rows anew."""
+        for each in self.verlet:
+            each.renew(state, worlds)
+
+    @property
+    def generation(self) -> int:
+        """Changes when rows have moved to new arrays; what was recorded before is then void."""
+        return sum(each.generation for each in self.verlet)
 
     @property
     def verlet(self) -> list[VerletList]:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 # Names of the engine's own per-particle arrays, which attributes of a scene cannot take.
 RESERVED = frozenset(
     "position velocity mass inverse_mass radius force world density pressure correction image "
-    "previous_position position_error velocity_error time dt".split()
+    "previous_position position_error velocity_error time dt x".split()
 )
 Color = tuple[float, float, float]
 PALETTE: tuple[Color, ...] = (
@@ -135,10 +135,12 @@ class Scene:
             "velocity": validate.rows(owner, "velocity", velocity, count, 3),
             "mass": validate.rows(owner, "mass", mass, count, None),
             "radius": validate.rows(owner, "radius", radius, count, None),
-            "pinned": np.broadcast_to(np.asarray(pinned, dtype=bool), (count,)).astype(float),
+            "pinned": validate.rows(owner, "pinned", pinned, count, None),
         }
-        _bounded(owner, "mass", columns["mass"], columns["mass"] > 0, "above 0")
-        _bounded(owner, "radius", columns["radius"], columns["radius"] >= 0, "at least 0")
+        m, r, held = columns["mass"], columns["radius"], columns["pinned"]
+        _bounded(owner, "mass", m, m > 0, "above 0", "use pinned=True to hold")
+        _bounded(owner, "radius", r, r >= 0, "at least 0", "give a size")
+        _bounded(owner, "pinned", held, (held == 0) | (held == 1), "True or False", "choose one")
         for key, value in attributes.items():
             columns[key] = self._attribute(owner, key, value, count)
         for key, column in columns.items():
@@ -153,7 +155,9 @@ class Scene:
             parts.append(columns.get(key, np.zeros(shape)))
         chosen = PALETTE[len(self.groups) % len(PALETTE)]
         if color is not None:
-            red, green, blue = validate.vector(owner, "color", color)
+            rgb = validate.vector(owner, "color", color)
+            _bounded(owner, "color", rgb, (rgb >= 0) & (rgb <= 1), "from 0 to 1", "scale it")
+            red, green, blue = rgb
             chosen = (float(red), float(green), float(blue))
         result = Group(self, name, self.particle_count, self.particle_count + count, chosen)
         self.groups.append(result)
@@ -249,7 +253,8 @@ def _box(periodic: Any) -> tuple[np.ndarray, np.ndarray, tuple[bool, bool, bool]
     if periodic is None:
         return None
     owner = "Scene"
-    if len(periodic) != 2 or any(len(corner) != 3 for corner in periodic):
+    sized = np.ndim(periodic) or isinstance(periodic, list | tuple)
+    if not sized or len(periodic) != 2 or any(np.shape(corner) != (3,) for corner in periodic):
         raise validate.fail(
             owner, "periodic", "be (lower, upper), three each", periodic, "give both corners"
         )
@@ -269,10 +274,9 @@ def _box(periodic: Any) -> tuple[np.ndarray, np.ndarray, tuple[bool, bool, bool]
     return lower, upper, (on[0], on[1], on[2])
 
 
-def _bounded(owner: str, name: str, values: np.ndarray, good: np.ndarray, condition: str) -> None:
+def _bounded(
+    owner: str, name: str, values: np.ndarray, good: np.ndarray, condition: str, remedy: str
+) -> None:
     if not good.all():
         at = int(np.argmin(good))
-        raise validate.fail(
-            owner, f"{name}[{at}]", f"be {condition}", float(values[at]), "use pinned=True to hold"
-            if name == "mass" else "give a size",
-        )  # fmt: skip
+        raise validate.fail(owner, f"{name}[{at}]", f"be {condition}", float(values[at]), remedy)

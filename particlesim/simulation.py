@@ -15,7 +15,6 @@ from .errors import SimulationError
 from .explain import Explanation, explain
 from .integrators import METHODS
 from .interactions.fusion import fuse
-from .kernels.integrate import tick_kernel
 from .kernels.reduce import finite_kernel
 from .launch import Executor, Frame, launch, owner, record
 from .model import Model
@@ -96,7 +95,8 @@ class Simulation:
         self._status = wp.zeros(1, dtype=wp.int32, device=self.device)
         self.snapshot = Snapshot(self)
         self._executor: Executor | None = None
-        self._forces_known = False
+        self._rows_of_executor = 0
+        self._unknown_forces = set(range(model.world_count))
 
     # The loop -------------------------------------------------------------------------------
 
@@ -110,8 +110,6 @@ class Simulation:
         for constraint in self.constraints:
             with owner(constraint.name):
                 constraint.finish(self.state, self.neighbors, dt)
-        if "time" in self.state:
-            launch(tick_kernel(), self.world_count, [dt, self.state.time], self.device)
 
     def forces(self, dt: float) -> None:
         """Interactions add forces at the present positions."""
@@ -142,7 +140,7 @@ class Simulation:
                 first such particle, its world and the time. The state is the last good frame's.
         """
         if self.particle_count and self.settings.dt > 0:
-            if self.integrator.carries_forces and not self._forces_known:
+            if self.integrator.carries_forces and self._unknown_forces:
                 self._evaluate_forces()
             self.executor.run()
             while self.neighbors.overflowing:
@@ -204,23 +202,33 @@ class Simulation:
     @property
     def executor(self) -> Executor:
         """What runs the frames; made on first use."""
+        if self._rows_of_executor != self.neighbors.generation:
+            self.close()  # what it has recorded points to rows that were too short
         if self._executor is None:
             self._executor = Executor(self._frame(), self.settings, self.device)
+            self._rows_of_executor = self.neighbors.generation
         return self._executor
 
     def _redo_with_longer_rows(self) -> None:
         """Nothing is ever left out of a full row: back to the start of the frame, and again."""
         self.neighbors.lengthen()
         self.snapshot.restore()
-        self.close()
+        self._status.zero_()
         self.executor.run()
 
     def _evaluate_forces(self) -> None:
-        """The forces that a first kick starts from."""
+        """The forces that a first kick starts from, in the worlds where they are not known."""
+        state, known = self.state, set(range(self.world_count)) - self._unknown_forces
+        before = state.force.numpy().copy() if known and "force" in state else None
         self.forces(self.settings.substep)
         if self.neighbors.grow():
             self.forces(self.settings.substep)
-        self._forces_known = True
+        if before is not None:
+            # Forces that depend on velocity would not come out as they were within the step.
+            force, keep = state.force.numpy().copy(), np.isin(self.model.world_of, list(known))
+            force[keep] = before[keep]
+            state.force.assign(force)
+        self._unknown_forces.clear()
 
     def close(self) -> None:
         """Let go of graphs and threads; the next step makes them anew."""
@@ -289,16 +297,31 @@ class Simulation:
         shape = host[rows].shape
         width = shape[1] if len(shape) == 2 else None
         host[rows] = validate.rows("Simulation.set", name, value, shape[0], width)
+        if name == "mass":
+            self._invert(host, rows)
         array.assign(host)
         error = f"{name}_error"
         if error in self.state:
             kept = self.state[error].numpy().copy()
             kept[rows] = 0
             self.state[error].assign(kept)
+        worlds = np.unique(self.model.world_of[rows]).tolist()
         if name == "position":
-            for each in self.neighbors.verlet:
-                each.mark_all()
-        self._forces_known = False
+            self.neighbors.renew(self.state, worlds)
+            for constraint in self.constraints:
+                constraint.placed(worlds)
+        self._unknown_forces.update(worlds)
+
+    def _invert(self, mass: np.ndarray, rows: slice) -> None:
+        """Have the inverse masses follow the masses; pinned particles stay pinned."""
+        if not (mass[rows] > 0).all():
+            raise validate.fail(
+                "Simulation.set", "mass", "be above 0", float(mass[rows].min()), "give a mass"
+            )
+        if "inverse_mass" in self.state:
+            inverse = self.get("inverse_mass")
+            inverse[rows] = np.where(inverse[rows] > 0, 1.0 / mass[rows], 0.0)
+            self.state.inverse_mass.assign(inverse)
 
     def world(self, index: int) -> World:
         """A view of one world."""
@@ -309,23 +332,23 @@ class Simulation:
 
         A world that is reset goes as it went the first time; the others go on untouched.
         """
-        chosen = list(range(self.world_count)) if worlds is None else [int(w) for w in worlds]
-        for w in chosen:
-            if not 0 <= w < self.world_count:
-                raise validate.fail(
-                    "Simulation.reset", "worlds", f"be from 0 to {self.world_count - 1}", w,
-                    "name worlds of this simulation",
-                )  # fmt: skip
-        if len(chosen) == self.world_count:
+        owner, count = "Simulation.reset", self.world_count
+        given = range(count) if worlds is None else worlds
+        given = given if isinstance(given, Iterable) else [given]
+        chosen = sorted({validate.whole(owner, "worlds", w) for w in given})
+        if chosen and chosen[-1] >= count:
+            raise validate.fail(
+                owner, "worlds", f"be from 0 to {count - 1}", chosen[-1],
+                "name worlds of this simulation",
+            )  # fmt: skip
+        if len(chosen) == count:
             self.frame = 0
         self.state.reset(chosen)
         self._status.zero_()
-        for each in self.neighbors.verlet:
-            each.mark(chosen)
+        self.neighbors.renew(self.state, chosen)
         for part in [*self.interactions, *self.constraints]:
             part.reset(chosen)
-        if self._forces_known:
-            self._evaluate_forces()
+        self._unknown_forces.update(chosen)
 
     def diagnostics(self) -> Diagnostics:
         """Conserved quantities of every world at the present time."""

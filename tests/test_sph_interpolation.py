@@ -34,11 +34,17 @@ def build(count=400, periodic=None, **options):
     water = scene.add_particles(x, velocity=v, mass=m, charge=x[:, 0], tint=x[:, :3] * 2)
     sph = scene.add_interaction(
         ps.SPH(water, **{
-            "smoothing_length": H, "rest_density": 1.0, "equation_of_state": ps.Tait(5.0),
+            "smoothing_length": H, "rest_density": 1.0, "equation_of_state": ps.Tait(0.5),
             **options,
         })
     )  # fmt: skip
     return scene, sph
+
+
+def simulated(scene, **settings):
+    """The last interaction of the scene as it lives in a simulation of it."""
+    settings = ps.Settings(**{"precision": "float64", **settings})
+    return ps.Simulation(scene, settings, device="cpu").interactions[-1]
 
 
 @pytest.mark.parametrize("count", [400, 1200])
@@ -88,11 +94,11 @@ def test_reproduces_a_linear_field_inside(name, ratio):
     spacing = 0.1
     scene = ps.Scene()
     water = scene.add_particles(ps.sample.box((0, 0, 0), (1, 1, 1), spacing), mass=spacing**3)
-    sph = scene.add_interaction(
+    scene.add_interaction(
         ps.SPH(water, smoothing_length=ratio * spacing, rest_density=1.0,
                equation_of_state=ps.Tait(1.0), smoothing=name)
     )  # fmt: skip
-    ps.Simulation(scene, ps.Settings(precision="float64"), device="cpu")
+    sph = simulated(scene)
     gradient, offset = np.array([1.0, -2.0, 0.5]), 3.0
     points = np.random.default_rng(0).uniform(0.4, 0.6, (100, 3))
     expected = points @ gradient + offset
@@ -104,18 +110,15 @@ def test_reproduces_a_linear_field_inside(name, ratio):
 
 
 def test_away_from_the_fluid_and_at_no_point():
-    scene, sph = build()
-    ps.Simulation(scene, device="cpu")
+    sph = simulated(build()[0], precision="float32")
     far = np.array([[1e3, 0, 0], [0, -1e12, 0], [-5.0, 2.0, 2.0]])
     assert np.all(sph.interpolate(far, "density") == 0)
     assert np.all(sph.interpolate(far, "velocity", normalized=True) == 0)
     assert sph.interpolate(np.zeros((0, 3)), "velocity").shape == (0, 3)
-    scene.add_particles(np.zeros((0, 3)))
 
 
 def test_periodic_images_are_the_same_point():
-    scene, sph = build(600, ((0, 0, None), (4, 5, None)))
-    ps.Simulation(scene, ps.Settings(precision="float64"), device="cpu")
+    sph = simulated(build(600, ((0, 0, None), (4, 5, None)))[0])
     points = np.random.default_rng(1).uniform(0, 1, (50, 3)) * SIDE
     moved = points + np.array([4.0, 5.0, 0.0]) * np.array([3, -2, 0])
     assert np.allclose(
@@ -130,8 +133,8 @@ def test_fields_by_name_and_by_value():
     scene.add_particles(np.full((7, 3), 9.0), tint=np.ones((7, 3)))
     water = scene.add_particles(x, mass=m, charge=x[:, 0], tint=2 * x)
     options = {"smoothing_length": H, "rest_density": 1.0, "equation_of_state": ps.Tait(5.0)}
-    sph = scene.add_interaction(ps.SPH(water, **options))
-    ps.Simulation(scene, ps.Settings(precision="float64"), device="cpu")
+    scene.add_interaction(ps.SPH(water, **options))
+    sph = simulated(scene)
     points = x[:9] + 0.1
     by_name = sph.interpolate(points, "charge")
     everything = np.concatenate([np.full(7, np.pi), x[:, 0]])
@@ -146,19 +149,12 @@ def test_fields_by_name_and_by_value():
 
 
 def test_each_world_has_its_own_fluid():
-    scenes = []
-    for k in range(3):
-        scene, sph = build(100, smoothing_length=H + 0.1 * k)
-        scenes.append((scene, sph))
+    scenes = [build(100, smoothing_length=H + 0.1 * k)[0] for k in range(3)]
     points = np.random.default_rng(1).uniform(0, 1, (20, 3)) * SIDE
-    settings = ps.Settings(precision="float64")
-    alone = []
-    for scene, sph in scenes:
-        ps.Simulation(scene, settings, device="cpu")
-        alone.append(sph.interpolate(points, "density"))
-    ps.Simulation([scene for scene, _ in scenes], settings, device="cpu")
+    alone = [simulated(scene).interpolate(points, "density") for scene in scenes]
+    together = simulated(scenes)
     for k in range(3):
-        assert np.allclose(scenes[0][1].interpolate(points, "density", world=k), alone[k])
+        assert np.allclose(together.interpolate(points, "density", world=k), alone[k])
     assert np.ptp([density.sum() for density in alone]) > 0
 
 
@@ -174,13 +170,11 @@ def test_each_world_has_its_own_fluid():
     ],
 )
 def test_bad_arguments(arguments, message):
-    scene, sph = build()
-    sim = ps.Simulation(scene, device="cpu")
+    sph = simulated(build()[0])
     with pytest.raises(ValueError, match=message):
         sph.interpolate(*arguments)
     with pytest.raises(ValueError, match="world must be from 0 to 0, got 1"):
         sph.interpolate([[0, 0, 0]], "density", world=1)
-    del sim
 
 
 def test_needs_a_simulation():

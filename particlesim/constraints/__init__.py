@@ -1,7 +1,16 @@
 """Constraints: what projects positions after integration."""
 
+from .boundary import BoxBoundary, PlaneBoundary
 from .constraint import Constraint
+from .contact import Contact
 from .distance import Distance
 from .force import ConstraintForce
 
-__all__ = ["Constraint", "ConstraintForce", "Distance"]
+__all__ = [
+    "BoxBoundary",
+    "Constraint",
+    "ConstraintForce",
+    "Contact",
+    "Distance",
+    "PlaneBoundary",
+]

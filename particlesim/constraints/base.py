@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..interactions.base import Bindable
@@ -48,6 +48,9 @@ class ConstraintBase(Bindable):
 
     def reset(self, worlds: Sequence[int]) -> None:
         """Forget what these worlds have left behind."""
+
+    def placed(self, worlds: Iterable[int]) -> None:
+        """Positions in these worlds were written from outside."""
 
     def shapes(self) -> list[dict[str, Any]]:
         """Static shapes to draw."""

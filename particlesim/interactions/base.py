@@ -98,9 +98,11 @@ class Interaction(Bindable):
         """Forget what these worlds have left behind."""
 
     def columns(self, names: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """Parameters of all worlds, one row a world."""
+        """Parameters of all worlds, one row a world: floats, or NumPy's own whole numbers."""
+        rows = {name: [peer.parameters[name] for peer in self.peers] for name in names}
         return {
-            name: np.array([peer.parameters[name] for peer in self.peers]) for name in names
+            name: np.array(row, np.int32 if isinstance(row[0], np.integer) else np.float64)
+            for name, row in rows.items()
         }
 
 
@@ -180,7 +182,7 @@ class Arguments:
 
     def _value(self, name: str, value: Any) -> Any:
         if self.law.parameters[name] is int:
-            return validate.whole(self.owner, name, value, minimum=-(2**31))
+            return np.int32(validate.whole(self.owner, name, value, minimum=-(2**31)))
         if np.ndim(value) == 0:
             return validate.number(self.owner, name, value)
         return validate.vector(self.owner, name, value)

@@ -50,7 +50,7 @@ class FusedPairs(Interaction):
         term = kernels.fused_term([part.term for part in parts], precision, Data, Params)
         self.kernel = kernels.pair_kernel(
             term, kernels.add_force(precision, Data, Params, first.Out), Data, Params, first.Out, 3,
-            precision, self.model.periodic, self.pairs.partners, self.model.device.is_cpu,
+            precision, self.model.periodic, self.pairs.partners, self.model.vectorised,
         )  # fmt: skip
 
     @property

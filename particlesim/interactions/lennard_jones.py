@@ -14,22 +14,29 @@ from .pair import Pair
 TRUNCATIONS = ("cut", "shift", "force_shift")
 
 
+@law
+def _first_power(s: float):
+    return s
+
+
 @functools.cache
 def _power(n: int) -> Law:
-    """s^n for a whole n, by squares."""
-    pairs, odd = n // 2, n % 2
+    """s^n for a whole n, by squares and without a loop, which could not be derived."""
+    if n == 1:
+        return _first_power
+    half = _power(n // 2)
 
     @law
-    def power(s: float):
-        square = s * s
-        result = float(1.0)
-        for _ in range(pairs):
-            result = result * square
-        for _ in range(odd):
-            result = result * s
-        return result
+    def even_power(s: float):
+        root = half(s)
+        return root * root
 
-    return power
+    @law
+    def odd_power(s: float):
+        root = half(s)
+        return root * root * s
+
+    return odd_power if n % 2 else even_power
 
 
 @functools.cache
@@ -86,6 +93,8 @@ class LennardJones(Pair):
     ):
         epsilon = validate.number(self.name, "epsilon", epsilon, minimum=0.0, unit="energy")
         sigma = validate.number(self.name, "sigma", sigma, above=0.0, unit="length")
+        if np.shape(exponents) != (2,):
+            raise validate.fail(self.name, "exponents", "be two", exponents, "give (n, m), n > m")
         n, m = (validate.whole(self.name, "exponents", e, minimum=1) for e in exponents)
         if n <= m:
             raise validate.fail(self.name, "exponents", "fall", exponents, "give (n, m), n > m")

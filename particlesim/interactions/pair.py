@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 # Closer than this, particles count as coincident: in parts of the cutoff, and without a cutoff.
 COINCIDENT, CLOSEST = 1e-6, 1e-12
+OWN = {"cutoff_squared", "closest_squared"}  # parameters of every pair force
 
 
 class Pair(Interaction):
@@ -61,6 +62,16 @@ class Pair(Interaction):
                     self.name, "law", "take the distance r as its first parameter", each.name,
                     "write def law(r, ...)",
                 )  # fmt: skip
+            taken = sorted(OWN & each.parameters.keys())
+            if taken:
+                raise validate.fail(
+                    self.name, f"parameter of {each.name}", "have a name of its own", taken[0],
+                    "rename it",
+                )  # fmt: skip
+            if "cutoff" in each.parameters and self.cutoff is not None:
+                parameters = {**parameters, "cutoff": self.cutoff}
+        if potential is not None:
+            potential.check_derivable(self.name)
         self.arguments = [
             Arguments(self.name, each, 1, parameters, ("_i", "_j")) for each in self.laws
         ]
@@ -72,7 +83,7 @@ class Pair(Interaction):
         self.requires = frozenset({"force"}) | self.quantities
 
     def kind(self) -> tuple[Any, ...]:
-        laws = [each and each.func for each in (self.potential, self.force)]
+        laws = [each and each.key for each in (self.potential, self.force)]
         return (type(self), *laws, self.cutoff is None, tuple(self.parameters))
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
@@ -111,7 +122,7 @@ class Pair(Interaction):
             chosen.function(precision), arguments, derivative, precision, self.Data, self.Params
         )
         store = kernels.add_force(precision, self.Data, self.Params, self.Out)
-        self.kernel = self._kernel(self.term, store, self.Out, 3, vectorised=model.device.is_cpu)
+        self.kernel = self._kernel(self.term, store, self.Out, 3, vectorised=model.vectorised)
 
     def _kernel(self, term: Any, store: Any, out: Any, width: int, vectorised: bool) -> Any:
         model = self.model
@@ -138,7 +149,7 @@ class Pair(Interaction):
             self.potential.function(precision), arguments, precision, self.Data, self.Params
         )
         store = kernels.store_measure(precision, self.Data, self.Params, Out)
-        kernel = self._kernel(term, store, Out, 2, vectorised=self.model.device.is_cpu)
+        kernel = self._kernel(term, store, Out, 2, vectorised=self.model.vectorised)
         inputs = [self.pairs.pairs, self.model.box, self.params, self.data, filled(Out, out)]
         launch(kernel, self.pairs.count, inputs, self.model.device)
 

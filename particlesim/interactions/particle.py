@@ -65,7 +65,7 @@ class ParticleForce(Interaction):
         return Arguments(self.name, each, 0, own, ("",), extra=("time",))
 
     def kind(self) -> tuple[Any, ...]:
-        return (type(self), self.law.func, self.potential and self.potential.func,
+        return (type(self), self.law.key, self.potential and self.potential.key,
                 tuple(self.parameters))  # fmt: skip
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:

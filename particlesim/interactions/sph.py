@@ -227,7 +227,7 @@ class SPH(Interaction):
         model = self.model
         return pair_kernel(
             term, store, self.Data, self.Params, out, width, model.precision, model.periodic,
-            self.pairs.partners, vectorised=model.device.is_cpu,
+            self.pairs.partners, vectorised=model.vectorised,
         )  # fmt: skip
 
     def _launch(self, kernel: Any, out: Any) -> None:

@@ -1,0 +1,257 @@
+"""Contacts between particles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from .. import validate
+from ..kernels import contact as kernels
+from ..kernels.pair import pair_kernel
+from ..launch import call, launch, when
+from .base import ConstraintBase
+from .easing import Easing
+from .tuples import bodies
+
+if TYPE_CHECKING:
+    from ..model import Model
+    from ..neighbors import Neighbors
+    from ..state import State
+
+CLOSEST = 1e-9  # parts of the cutoff: closer than this, particles count as coincident
+
+
+class Contact(ConstraintBase):
+    """Particles keep apart: r >= R_i + R_j, with Coulomb friction and restitution.
+
+    All contacts of an iteration are solved at once from the same positions (Jacobi), each particle
+    taken as split among its contacts (Tonge et al. 2012): pair corrections are opposite and equal,
+    so momentum is conserved, and no number of contacts makes them overshoot. Friction takes back
+    the tangential way of the substep, up to mu times the normal correction (Macklin et al. 2014,
+    eq. 24); particles do not spin. Restitution sets velocities after the solve (Mueller et al.
+    2020, eq. 34).
+
+    What overlaps at the start, or after positions were written, does not explode: the particles
+    count as smaller, by just as much as to leave no overlap, and grow back to their size at no
+    more than ``Settings.depenetration_speed``.
+
+    A stack of layers rests on an overlap of about valence times layers times g dt^2, which smaller
+    substeps or more iterations reduce.
+
+    Args:
+        group: Which particles touch each other; None: all. Those of radius 0 are points.
+        friction: mu, at least 0.
+        restitution: e, 0 to 1: speed after over speed before.
+        compliance: Overlap over force [length / force], at least 0. A compliant contact is solved
+            once a substep, so that it does not depend on the iterations.
+
+    Raises:
+        ValueError: Values out of range.
+
+    Example:
+        >>> Contact(friction=0.3).friction
+        0.3
+    """
+
+    requires = frozenset({"position", "velocity", "inverse_mass", "radius", "correction"})
+
+    def __init__(
+        self,
+        group: Any = None,
+        friction: float = 0.0,
+        restitution: float = 0.0,
+        *,
+        compliance: float = 0.0,
+    ):
+        name = self.name
+        self.group = group
+        self.friction = validate.number(name, "friction", friction, minimum=0.0)
+        self.restitution = validate.number(
+            name, "restitution", restitution, minimum=0.0, maximum=1.0
+        )
+        self.compliance = validate.number(
+            name, "compliance", compliance, minimum=0.0, unit="length/force"
+        )
+
+    def prepare(self, model: Model, neighbors: Neighbors) -> None:
+        self.model = model
+        members = model.members([peer.group for peer in self.peers], self.name)
+        radius, world = model.column("radius")[members], model.world_of[members]
+        largest = np.zeros(model.world_count)
+        np.maximum.at(largest, world, radius)
+        self.count = len(members) if largest.max(initial=0.0) > 0 else 0
+        if not self.count:
+            return
+        # A world of points has no contacts, but shares the list's arrays.
+        self.cutoff = 2.0 * np.where(largest > 0, largest, largest.max())
+        self.pairs = neighbors.request(
+            self.name, members, self.cutoff, {"position"}, for_constraint=True
+        )
+
+    def _column(self, name: str) -> np.ndarray:
+        return np.array([getattr(peer, name) for peer in self.peers], dtype=float)
+
+    def _params(self, active: np.ndarray) -> tuple[Any, wp.array]:
+        """Parameters with which the worlds that are not ``active`` find no pairs."""
+        columns = {
+            "cutoff_squared": np.where(active, self.cutoff**2, 0.0),
+            "closest_squared": (CLOSEST * self.cutoff) ** 2,
+            **{name: self._column(name) for name in ("friction", "restitution", "compliance")},
+        }
+        return self.model.parameters("ContactParameters", columns)
+
+    def attach(self, model: Model, state: State) -> None:
+        if not self.count:
+            return
+        precision = model.precision
+        self.bodies = bodies(model, state)
+        self.radius = state.radius
+        self.force = state.force if "force" in state else None
+        self.compensated = "position_error" in state
+        self.easing = Easing(model, state.count, precision.scalar, ends=2)
+        rough, hard = self._column("friction") > 0, self._column("compliance") == 0
+        bouncing = self._column("restitution") > 0
+        self.rough, self.bouncing = bool(rough.any()), bool(bouncing.any())
+        Data, Shares = kernels.contact_types(precision)
+        self.copies = {"x": self.pairs.array(precision.vec3)}
+        self.copies |= {k: self.pairs.array(precision.scalar) for k in ("radius", "share")}
+        if self.rough:
+            self.copies["grip"] = self.pairs.array(precision.scalar)
+        if self.rough or self.bouncing:
+            self.copies["way"] = self.pairs.array(precision.vec3)
+        if self.bouncing:
+            self.copies["v"] = self.pairs.array(precision.vec3)
+        self.Data = Data
+        self.shares, self.bounce_shares = Shares(), Shares()
+        for shares, relaxation in (
+            (self.shares, model.settings.relaxation), (self.bounce_shares, 1.0)
+        ):  # fmt: skip
+            shares.share, shares.w = self.copies["share"], state.inverse_mass
+            shares.relaxation = relaxation
+        if self.rough:
+            self.shares.grip, self.shares.grips = self.copies["grip"], 1
+        self.everywhere = self._params(np.ones_like(rough))
+        self.bounces = self._params(bouncing)
+        # A world is solved by the kernel that it would be solved by alone. First come the passes of
+        # the first sweep, then those of all others, from which compliant contacts are left out.
+        self.passes = [
+            [
+                (self._push_kernel(with_friction), self._params(chosen)[1])
+                for with_friction, chosen in ((False, ~rough & also), (True, rough & also))
+                if chosen.any()
+            ]
+            for also in (np.ones_like(rough), hard)
+        ]
+        self.count_kernel, self.count_bounces = (
+            self._kernel(
+                kernels.crowding_term(precision, self._Params, bounce), kernels.store_share,
+                Shares, 6,
+            )
+            for bounce in (False, True)
+        )
+        self.bounce_kernel = self._kernel(
+            kernels.bounce_term(precision, self._Params), kernels.store_impulse,
+            kernels.bodies_type(precision), 3,
+        )  # fmt: skip
+
+    @property
+    def _Params(self) -> Any:
+        return self.everywhere[0]
+
+    def _kernel(self, term: wp.Function, store: Any, out: Any, width: int) -> wp.Kernel:
+        model = self.model
+        return pair_kernel(
+            term, store(model.precision, self._Params), self.Data, self._Params, out, width,
+            model.precision, model.periodic, self.pairs.partners, model.device.is_cpu,
+        )  # fmt: skip
+
+    def _push_kernel(self, friction: bool) -> wp.Kernel:
+        precision = self.model.precision
+        return self._kernel(
+            kernels.contact_term(precision, self._Params, friction),
+            lambda *types: kernels.store_correction(*types, self.compensated),
+            kernels.bodies_type(precision), 3,
+        )  # fmt: skip
+
+    def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        self.sweep = 0
+        # A static projection goes by the radii as they are, and leaves the marks to the first step.
+        if not self.count or math.isinf(dt) or dt <= 0:
+            return
+        model, pairs = self.model, self.pairs.pairs
+        measure, run_out = kernels.slack_kernels(model.precision, model.periodic)
+        slack = self.easing.slack
+        with when(self.easing.any_marked):
+            launch(
+                measure,
+                self.count,
+                [pairs, model.box, self.easing.marked, self.bodies, self.radius, dt, slack],
+                model.device,
+            )
+            call(self.easing.unmark)
+        inputs = [pairs, self.radius, self.easing.struct, dt, slack]
+        launch(run_out, self.count, inputs, model.device)
+
+    def _data(self, dt: float) -> Any:
+        """The copies in slot order, as the terms take them."""
+        data = self.Data()
+        for name, array in self.copies.items():
+            setattr(data, name, array)
+        data.inverse_dt_squared = 1.0 / dt**2
+        return data
+
+    def _sum(self, kernel: wp.Kernel, params: wp.array, data: Any, out: Any) -> None:
+        inputs = [self.pairs.pairs, self.model.box, params, data, out]
+        launch(kernel, self.count, inputs, self.model.device)
+
+    def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        passes = self.passes[min(self.sweep, 1)] if self.count and dt > 0 else []
+        self.sweep += 1
+        if not passes:
+            return
+        model, data = self.model, self._data(dt)
+        moving = not math.isinf(dt)
+        gather = kernels.gather_kernel(model.precision, self.compensated, self.rough)
+        launch(
+            gather,
+            self.count,
+            [self.pairs.pairs, self.bodies, self.radius, self.easing.slack, float(moving),
+             dt if moving else 0.0, float(moving), data],
+            model.device,
+        )  # fmt: skip
+        self._sum(self.count_kernel, self.everywhere[1], data, self.shares)
+        for kernel, params in passes:
+            self._sum(kernel, params, data, self.bodies)
+
+    def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        if not self.count or not self.bouncing or dt <= 0:
+            return
+        model, data = self.model, self._data(dt)
+        precision = model.precision
+        gather = kernels.gather_bounce_kernel(
+            precision, self.compensated, self.force is not None
+        )
+        force = wp.empty(0, dtype=precision.vec3) if self.force is None else self.force
+        launch(
+            gather,
+            self.count,
+            [self.pairs.pairs, self.bodies, force, self.radius, self.easing.slack, dt, 1.0 / dt,
+             data],
+            model.device,
+        )  # fmt: skip
+        self._sum(self.count_bounces, self.bounces[1], data, self.bounce_shares)
+        self._sum(self.bounce_kernel, self.bounces[1], data, self.bodies)
+
+    def persistent(self) -> dict[str, wp.array]:
+        return self.easing.persistent() if self.count else {}
+
+    def reset(self, worlds: Sequence[int]) -> None:
+        self.placed(worlds)
+
+    def placed(self, worlds: Iterable[int]) -> None:
+        if self.count:
+            self.easing.mark(worlds)
