@@ -223,7 +223,8 @@ def box_kernels(
         if wp.dot(back, back) > real(0.0) and b.w[i] > real(0.0):
             dx = back
             if p.friction > real(0.0):
-                u = b.v[i] * dt + b.correction[i] * moving
+                # With the normal corrections: a way into one side is no slip along another.
+                u = b.v[i] * dt + b.correction[i] * moving + back
                 for a in range(3):
                     n = vec3()
                     n[a] = real(1.0)

@@ -142,7 +142,7 @@ def plain_loop(
                 result += term(i, j, x_ij, r2, d, p)
         return result
 
-    return function(plain_rows if partners == ROWS else plain_all)
+    return function(plain_rows if partners == ROWS else plain_all, after_gradients=True)
 
 
 _HEAD = {

@@ -182,22 +182,27 @@ def _digest(*parts: Any) -> str:
     return hashlib.sha256("|".join(map(text, parts)).encode()).hexdigest()[:12]
 
 
-def function(func: Callable[..., Any]) -> wp.Function:
+def function(func: Callable[..., Any], after_gradients: bool = False) -> wp.Function:
     """Register ``func``, annotated with Warp types, under a native name that repeats in every run.
 
     ``wp.func`` numbers its native names by the order of creation; functions that native snippets
     call by name would then miss the kernel cache whenever that order changes. The name hashes
     the source and the closure, by the native names of the functions in it.
+
+    ``after_gradients`` has Warp emit it together with the functions that use ``wp.grad``, which
+    it may then call.
     """
     cells = [c.cell_contents for c in func.__closure__ or ()]
     digest = _digest(inspect.getsource(func), *cells, *func.__annotations__.values())
-    return wp.Function(
+    result = wp.Function(
         func,
         key=func.__name__,
         namespace="",
         module=wp.get_module(func.__module__),
         native_func=f"{func.__name__}_{digest}",
     )
+    result.adj.uses_grad_call = after_gradients
+    return result
 
 
 def native(stub: Callable[..., Any], snippet: str, after_gradients: bool = True) -> wp.Function:

@@ -253,8 +253,11 @@ def _box(periodic: Any) -> tuple[np.ndarray, np.ndarray, tuple[bool, bool, bool]
     if periodic is None:
         return None
     owner = "Scene"
-    sized = np.ndim(periodic) or isinstance(periodic, list | tuple)
-    if not sized or len(periodic) != 2 or any(np.shape(corner) != (3,) for corner in periodic):
+    try:
+        lengths = [len(corner) for corner in periodic]
+    except TypeError:
+        lengths = []
+    if lengths != [3, 3]:
         raise validate.fail(
             owner, "periodic", "be (lower, upper), three each", periodic, "give both corners"
         )

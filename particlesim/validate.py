@@ -68,7 +68,7 @@ def vector(owner: str, argument: str, value: Any, *, unit: str = "") -> np.ndarr
 
 def rows(owner: str, argument: str, value: Any, count: int | None, width: int | None) -> np.ndarray:
     """``value`` as a finite (count, width) or, for width None, (count,) array; broadcast to it."""
-    result = _array(owner, argument, value)
+    result = _array(owner, argument, value).copy()
     if count is None:
         if result.ndim != 2 or result.shape[1] != width:
             if result.size == 0:

@@ -1,5 +1,8 @@
 """Fixtures shared by all tests."""
 
+import re
+from contextlib import contextmanager
+
 import pytest
 import warp as wp
 
@@ -19,6 +22,21 @@ def device(request):
 def precision(request):
     """Both precisions."""
     return request.param
+
+
+@pytest.fixture
+def refused():
+    """A context in which bad input must raise an error of the house form that says ``match``."""
+
+    @contextmanager
+    def check(match="", kind=ValueError):
+        with pytest.raises(kind) as caught:
+            yield
+        text = str(caught.value.args[0])
+        assert re.fullmatch(r"\w[\w.]*: .+ must .+, got .*; .+\.", text, re.DOTALL), text
+        assert re.search(match, text), text
+
+    return check
 
 
 @pytest.fixture

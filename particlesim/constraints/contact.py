@@ -133,7 +133,7 @@ class Contact(ConstraintBase):
             shares.share, shares.w = self.copies["share"], state.inverse_mass
             shares.relaxation = relaxation
         if self.rough:
-            self.shares.grip, self.shares.grips = self.copies["grip"], 1
+            self.shares.grip = self.bounce_shares.grip = self.copies["grip"]
         self.everywhere = self._params(np.ones_like(rough))
         self.bounces = self._params(bouncing)
         # A world is solved by the kernel that it would be solved by alone. First come the passes of

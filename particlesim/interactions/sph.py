@@ -77,7 +77,7 @@ class SPH(Interaction):
         ...     SPH(water, smoothing_length=0.2, rest_density=1000.0,
         ...         equation_of_state=Tait(sound_speed=30.0)))
         >>> sim = Simulation(scene, Settings(dt=1 / 60, substeps=20), device="cpu")
-        >>> fluid.interpolate([(0.5, 0.5, 0.5)], "density").round(-1).tolist()
+        >>> fluid.interpolate([(0.5, 0.5, 0.5)], "density").round(-2).tolist()
         [1000.0]
     """
 
