@@ -1,13 +1,13 @@
-"""Constraints as penalty forces: every particle gathers over its own tuples, so nothing collides."""
+"""Constraints as penalty forces: every particle gathers over its own tuples: nothing collides."""
 
 import functools
 from typing import Any
 
 import warp as wp
 
-from .constraints import bodies_type, positions_type, seen_function, tuples_type
+from .constraints import bodies_type, load_function, seen_function, tuples_type
 from .loops import Periodicity, box_type
-from .precision import Precision, function, register
+from .precision import Precision, register
 
 
 @wp.struct
@@ -28,20 +28,8 @@ def force_kernels(
     """Kernels: f_a -= grad_a C (C / alpha + beta dC/dt); energy C^2 / (2 alpha) and virial."""
     vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
     Bodies, Tuples = bodies_type(precision), tuples_type(precision, size, item)
-    positions = positions_type(precision, size)
+    load = load_function(precision, compensated, size)
     seen = seen_function(precision, periodic, compensated, size, relative)
-
-    def positions_of(r: int, box: wp.array(dtype=Box), t: Tuples, b: Bodies):
-        ids = t.particle[r]
-        x = positions()
-        e = positions()
-        for a in range(wp.static(size)):
-            x[a] = b.x[ids[a]]
-            if wp.static(compensated):
-                e[a] = b.x_error[ids[a]]
-        return seen(x, e, box, t.world, r)
-
-    look = function(positions_of)
 
     @register
     def constraint_force(
@@ -59,7 +47,8 @@ def force_kernels(
             r = seats.tuple[n]
             ids = t.particle[r]
             q = t.item[r]
-            C, G = evaluate(look(r, box, t, b), q)
+            x, e = load(ids, b)
+            C, G = evaluate(seen(x, e, box, t.world, r), q)
             rate = real(0.0)
             for a in range(wp.static(size)):
                 rate += wp.dot(G[a], b.v[ids[a]])
@@ -86,7 +75,8 @@ def force_kernels(
         for n in range(seats.begin[k], seats.begin[k + 1]):
             r = seats.tuple[n]
             q = t.item[r]
-            X = look(r, box, t, b)
+            x, e = load(t.particle[r], b)
+            X = seen(x, e, box, t.world, r)
             C, G = evaluate(X, q)
             a = seats.seat[n]
             pull = C / q.compliance

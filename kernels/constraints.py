@@ -106,10 +106,28 @@ def distance_evaluation(sign: int, precision: Precision, item: Any) -> wp.Functi
 
 
 @functools.cache
+def load_function(precision: Precision, compensated: bool, size: int) -> wp.Function:
+    """``load(ids, b) -> (x, e)``: positions of a tuple, and what rounding has kept from them."""
+    Bodies, positions = bodies_type(precision), positions_type(precision, size)
+    indices = wp.types.vector(length=size, dtype=wp.int32)
+
+    def load(ids: indices, b: Bodies):
+        x = positions()
+        e = positions()
+        for a in range(wp.static(size)):
+            x[a] = b.x[ids[a]]
+            if wp.static(compensated):
+                e[a] = b.x_error[ids[a]]
+        return x, e
+
+    return function(load)
+
+
+@functools.cache
 def seen_function(
     precision: Precision, periodic: Periodicity, compensated: bool, size: int, relative: bool
 ) -> wp.Function:
-    """``seen(x, e, box, w)``: the positions as an evaluation sees them, in one piece.
+    """``seen(x, e, box, world, r)``: what an evaluation sees of the positions, in one piece.
 
     ``relative``: taken from the first particle, together with what rounding has kept from them:
     far from the origin a distance is then as exact as near to it.
@@ -117,13 +135,16 @@ def seen_function(
     Box, positions = box_type(precision), positions_type(precision, size)
     image, wraps = minimum_image(precision, periodic), bool(periodic)
 
-    def seen(x: positions, e: positions, box: wp.array(dtype=Box), w: wp.array(dtype=wp.int32), r: int):
+    def seen(
+        x: positions, e: positions, box: wp.array(dtype=Box), world: wp.array(dtype=wp.int32),
+        r: int,
+    ):  # fmt: skip
         X = x
         if wp.static(relative or wraps):
             for a in range(wp.static(size)):
                 d = x[a] - x[0]
                 if wp.static(wraps):
-                    d = image(d, box[w[r]])
+                    d = image(d, box[world[r]])
                 if wp.static(relative):
                     if wp.static(compensated):
                         d = d + (e[a] - e[0])
@@ -150,9 +171,11 @@ def project_kernel(
     """
     real, Box = precision.scalar, box_type(precision)
     Bodies, Tuples = bodies_type(precision), tuples_type(precision, size, item)
-    positions = positions_type(precision, size)
     weights = wp.types.vector(length=size, dtype=real)
-    place = place_function(precision, compensated)
+    load, place = (
+        load_function(precision, compensated, size),
+        place_function(precision, compensated),
+    )
     seen = seen_function(precision, periodic, compensated, size, relative)
 
     @register
@@ -171,17 +194,12 @@ def project_kernel(
                 return
         ids = t.particle[r]
         q = t.item[r]
-        x = positions()
-        e = positions()
-        w = weights()
-        for a in range(wp.static(size)):
-            x[a] = b.x[ids[a]]
-            w[a] = b.w[ids[a]]
-            if wp.static(compensated):
-                e[a] = b.x_error[ids[a]]
+        x, e = load(ids, b)
         C, G = evaluate(seen(x, e, box, t.world, r), q)
+        w = weights()
         s = real(0.0)
         for a in range(wp.static(size)):
+            w[a] = b.w[ids[a]]
             if wp.static(unit):
                 s += w[a]
             else:
@@ -210,7 +228,7 @@ def project_kernel(
 
 @functools.cache
 def reset_kernel(precision: Precision) -> wp.Kernel:
-    """Kernel: multipliers to zero at the start of a substep, and its time scale kept for reports."""
+    """Kernel: multipliers to zero as a substep starts, and its time scale kept for reports."""
     real = precision.scalar
 
     @register
@@ -230,10 +248,10 @@ def strain_kernel(
     evaluate: wp.Function, precision: Precision, periodic: Periodicity, compensated: bool,
     size: int, item: Any, relative: bool,
 ) -> wp.Kernel:  # fmt: skip
-    """Kernel: the force of each tuple, |lam| max_a |grad_a C| / dt^2; what exceeds its limit breaks."""
+    """Kernel: force of each tuple, |lam| max_a |grad_a C| / dt^2; what exceeds its limit breaks."""
     real, Box = precision.scalar, box_type(precision)
     Bodies, Tuples = bodies_type(precision), tuples_type(precision, size, item)
-    positions = positions_type(precision, size)
+    load = load_function(precision, compensated, size)
     seen = seen_function(precision, periodic, compensated, size, relative)
 
     @register
@@ -248,14 +266,8 @@ def strain_kernel(
     ):
         r = first + wp.tid()
         q = t.item[r]
-        ids = t.particle[r]
-        x = positions()
-        e = positions()
-        for a in range(wp.static(size)):
-            x[a] = b.x[ids[a]]
-            if wp.static(compensated):
-                e[a] = b.x_error[ids[a]]
-        C, G = evaluate(seen(x, e, box, t.world, r), q)
+        x, e = load(t.particle[r], b)
+        _C, G = evaluate(seen(x, e, box, t.world, r), q)
         steepest = real(0.0)
         for a in range(wp.static(size)):
             steepest = wp.max(steepest, wp.length(G[a]))

@@ -17,7 +17,7 @@ GONE = 1.0e-30  # slack that counts as none, so that what decays by e-folds ends
 
 @functools.cache
 def easing_type(precision: Precision):
-    """How fast slack runs out: a largest speed, given plainly or in radii a time; e-folds a time."""
+    """How slack runs out: its largest speed, given plainly or in radii a time; e-folds a time."""
     real = precision.scalar
     return structure(
         f"Easing_{precision.name}", {"speed": real, "radii_per_time": real, "rate": real}

@@ -29,7 +29,8 @@ class Settings:
             moved half of it. Changes the cost, not the forces. None: 0.12 of the cutoff.
         compensated: Carry the rounding error of positions and velocities along (Kahan 1965), so
             that neither freezes where an increment is below the last bit.
-        relaxation: Factor on averaged (Jacobi) contact corrections, in (0, 2).
+        relaxation: Factor on averaged (Jacobi) contact corrections, above 0, at most 1: more would
+            feed energy into stacks.
         depenetration_speed: Largest speed at which contacts push overlapping particles apart
             [length/s]. None: one radius a frame.
         execution: ``"graph"``, ``"threads"`` (CPU) or ``"auto"``, the faster as measured. Changes
@@ -68,7 +69,7 @@ class Settings:
         validate.choice(owner, "integrator", self.integrator, INTEGRATORS)
         validate.choice(owner, "precision", self.precision, PRECISIONS)
         validate.choice(owner, "execution", self.execution, EXECUTIONS)
-        validate.number(owner, "relaxation", self.relaxation, above=0.0, maximum=2.0)
+        validate.number(owner, "relaxation", self.relaxation, above=0.0, maximum=1.0)
         if self.skin is not None:
             validate.number(owner, "skin", self.skin, minimum=0.0, unit="length")
         if self.depenetration_speed is not None:

@@ -10,21 +10,21 @@ import warp as wp
 import particlesim as ps
 
 frames = 240
-settings = ps.Settings(dt=1 / 60, substeps=20)
+settings = ps.Settings(dt=1 / 60, substeps=80)
 
 
 @ps.law
 def sphere(r: float, stiffness: float, diameter: float):
-    """Energy of two elastic spheres pressed together (Hertz 1882)."""
-    overlap = wp.max(diameter - r, 0.0)
-    return 0.4 * stiffness * overlap * overlap * wp.sqrt(overlap)
+    """Energy of two elastic spheres pressed together, as by a linear spring."""
+    overlap = wp.where(r < diameter, diameter - r, 0.0)
+    return 0.5 * stiffness * overlap * overlap
 
 
 def build(
-    count: int = 3000,
+    count: int = 2000,
     speed: float = 2.0,
     diameter: float = 0.04,
-    stiffness: float = 2e4,
+    stiffness: float = 500.0,
     seed: int = 0,
 ) -> ps.Scene:
     """Spheres of mass 0.001 in a unit box.
@@ -33,7 +33,7 @@ def build(
         count: Spheres.
         speed: At the start, of every sphere [m/s].
         diameter: [m].
-        stiffness: Of a sphere [N/m^1.5].
+        stiffness: Of two spheres in contact [N/m].
         seed: Of positions and directions.
     """
     rng = np.random.default_rng(seed)

@@ -1,4 +1,8 @@
-"""Three balls on rigid rods, released from the side: chaos that keeps its energy."""
+"""Three balls on rigid rods, released from the side: chaos.
+
+XPBD takes energy out of a rod's swing in proportion to the substep: the error, of the energy, is
+0.22 after ten seconds at 100 substeps a frame, 0.07 at 400 and 0.03 at 1000.
+"""
 
 import itertools
 
@@ -7,7 +11,7 @@ import numpy as np
 import particlesim as ps
 
 frames = 600
-settings = ps.Settings(dt=1 / 60, substeps=20, iterations=2)
+settings = ps.Settings(dt=1 / 60, substeps=400)
 
 
 def build(length: float = 0.4, angle: float = 120.0, radius: float = 0.05) -> ps.Scene:

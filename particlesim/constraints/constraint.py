@@ -30,7 +30,8 @@ class Constraint(ConstraintBase):
 
     In each iteration a tuple's multiplier lam, zero at the start of a substep, grows by
 
-        dlam = (-C - alpha~ lam - gamma grad C . (x - x_prev)) / ((1 + gamma) sum w |grad C|^2 + alpha~)
+        dlam = (-C - alpha~ lam - gamma grad C . (x - x_prev))
+               / ((1 + gamma) sum w |grad C|^2 + alpha~)
 
     with alpha~ = alpha / dt^2 and gamma = alpha beta / dt, and its particles move by
     w_a grad_a C dlam (Macklin, Mueller and Chentanez 2016, eqs. 17, 18 and 26). Tuples are solved

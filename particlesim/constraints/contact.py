@@ -11,6 +11,8 @@ import warp as wp
 
 from .. import validate
 from ..kernels import contact as kernels
+from ..kernels import contact_terms as terms
+from ..kernels.constraints import bodies_type
 from ..kernels.pair import pair_kernel
 from ..launch import call, launch, when
 from .base import ConstraintBase
@@ -148,14 +150,16 @@ class Contact(ConstraintBase):
         ]
         self.count_kernel, self.count_bounces = (
             self._kernel(
-                kernels.crowding_term(precision, self._Params, bounce), kernels.store_share,
-                Shares, 6,
+                terms.crowding_term(precision, self._Params, bounce),
+                terms.store_share,
+                Shares,
+                6,
             )
             for bounce in (False, True)
         )
         self.bounce_kernel = self._kernel(
-            kernels.bounce_term(precision, self._Params), kernels.store_impulse,
-            kernels.bodies_type(precision), 3,
+            terms.bounce_term(precision, self._Params), terms.store_impulse,
+            bodies_type(precision), 3,
         )  # fmt: skip
 
     @property
@@ -172,9 +176,9 @@ class Contact(ConstraintBase):
     def _push_kernel(self, friction: bool) -> wp.Kernel:
         precision = self.model.precision
         return self._kernel(
-            kernels.contact_term(precision, self._Params, friction),
-            lambda *types: kernels.store_correction(*types, self.compensated),
-            kernels.bodies_type(precision), 3,
+            terms.contact_term(precision, self._Params, friction),
+            lambda *types: terms.store_correction(*types, self.compensated),
+            bodies_type(precision), 3,
         )  # fmt: skip
 
     def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
@@ -232,9 +236,7 @@ class Contact(ConstraintBase):
             return
         model, data = self.model, self._data(dt)
         precision = model.precision
-        gather = kernels.gather_bounce_kernel(
-            precision, self.compensated, self.force is not None
-        )
+        gather = kernels.gather_bounce_kernel(precision, self.compensated, self.force is not None)
         force = wp.empty(0, dtype=precision.vec3) if self.force is None else self.force
         launch(
             gather,

@@ -1,4 +1,4 @@
-"""Tuples of all worlds as the kernels take them: merged, sorted by colour, with their parameters."""
+"""Tuples of all worlds as the kernels take them: merged and sorted by colour."""
 
 from __future__ import annotations
 

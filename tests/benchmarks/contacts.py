@@ -49,9 +49,7 @@ def cloth(device="cpu", iterations=1, **knobs):
 def distance_time(device="cpu", **knobs):
     """Seconds of one iteration over the cloth's distances: 11 iterations less 1."""
     few, many = 1, 11
-    found = rates(
-        {str(n): lambda n=n: cloth(device, n, **knobs) for n in (few, many)}, frames=6
-    )
+    found = rates({str(n): lambda n=n: cloth(device, n, **knobs) for n in (few, many)}, frames=6)
     seconds = {n: KNOTS**2 / found[str(n)] for n in (few, many)}
     return (seconds[many] - seconds[few]) / (many - few)
 
