@@ -91,7 +91,7 @@ def slack_kernels(precision: Precision, periodic: Periodicity) -> tuple[wp.Kerne
 
 
 @functools.cache
-def gather_kernel(precision: Precision, compensated: bool, friction: bool) -> wp.Kernel:
+def gather_kernel(precision: Precision, compensated: bool) -> wp.Kernel:
     """Kernel: positions, radii and ways into slot order.
 
     With compensated sums the positions are taken from a particle of the same world: differences
@@ -120,8 +120,7 @@ def gather_kernel(precision: Precision, compensated: bool, friction: bool) -> wp
             x = (x - b.x[o]) + (b.x_error[i] - b.x_error[o])
         d_out.x[s] = x
         d_out.radius[s] = radius[i] - eased * slack[i]
-        if wp.static(friction):
-            d_out.way[s] = b.v[i] * dt + b.correction[i] * follow
+        d_out.way[s] = b.v[i] * dt + b.correction[i] * follow
 
     return gather_contacts
 

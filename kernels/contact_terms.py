@@ -107,20 +107,27 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
 
     def push(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
         r, n = separation(i, j, x_ij, r2, p.closest_squared)
-        overlap = d.radius[i] + d.radius[j] - r
+        reach = d.radius[i] + d.radius[j]
+        touching = r < reach
+        u = d.way[i] - d.way[j]
+        # A pair that has passed through each other goes back the way it came.
+        y = x_ij - u
+        y2 = wp.dot(y, y)
+        through = wp.dot(y, x_ij) < real(0.0) and y2 > p.closest_squared
+        back = y * (real(1.0) / wp.sqrt(wp.where(through, y2, real(1.0))))
+        n = wp.where(through, back, n)
+        r = wp.where(through, wp.dot(back, x_ij), r)
         share = d.share[i] + d.share[j]
         soft = share + p.compliance * d.inverse_dt_squared
-        active = overlap > real(0.0) and share > real(0.0)
-        lam = wp.where(active, overlap, real(0.0)) / wp.where(active, soft, real(1.0))
+        active = touching and share > real(0.0)
+        lam = wp.where(active, reach - r, real(0.0)) / wp.where(active, soft, real(1.0))
         result = n * lam
         if wp.static(friction):
-            u = d.way[i] - d.way[j]
             t = u - n * wp.dot(u, n)
             length = wp.sqrt(wp.dot(t, t))
             split = wp.max(d.grip[i] + d.grip[j], real(1.0e-30))
             limit = p.friction * lam / wp.max(length, real(1.0e-30))
-            grip = wp.min(real(1.0) / split, limit)
-            result = result - t * grip
+            result = result - t * wp.min(real(1.0) / split, limit)
         return result
 
     return function(push)

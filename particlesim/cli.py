@@ -108,6 +108,10 @@ def run(
     worlds: Worlds = None,
     precision: Precision = None,
     substeps: Substeps = None,
+    fields: Annotated[
+        list[str] | None,
+        typer.Option("--field", metavar="NAME", help="Write this array too, as density; repeat."),
+    ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an output that exists.")
     ] = False,
@@ -129,7 +133,10 @@ def run(
         wanted = getattr(module, "frames", DEFAULT_FRAMES) if frames is None else frames
         with meter.measure(label(module), sim, wanted) as progress:
             record = None if out is None else str(out)
-            sim.run(frames=wanted, record=record, progress=progress, overwrite=overwrite)
+            sim.run(
+                frames=wanted, record=record, progress=progress, overwrite=overwrite,
+                fields=fields or (),
+            )  # fmt: skip
         summary = meter.summary()
         if hasattr(module, "error") and frames is None and worlds is None:
             summary += f"; error {module.error(sim):.3g}"

@@ -146,7 +146,10 @@ def _shapes(sim: Simulation) -> list[Shape]:
     for part in sim.constraints:
         for w, peer in enumerate(part.peers):
             for each in peer.shapes():
-                described = dict(each)
+                described = {
+                    key: _drawable(key, value, sim.scenes[w].position)
+                    for key, value in each.items()
+                }
                 make = getattr(Shape, described.pop("kind"))
                 shapes.append(make(world=w, name=part.name, **described))
     return shapes
@@ -159,3 +162,12 @@ def _periodic(sim: Simulation) -> tuple[np.ndarray, np.ndarray] | None:
         return None
     on = length[0] > 0
     return np.where(on, lower[0], np.nan), np.where(on, lower[0] + length[0], np.nan)
+
+
+def _drawable(name: str, value: Any, position: np.ndarray) -> Any:
+    """Open sides of a box end where the particles start."""
+    if name not in ("lower", "upper"):
+        return value
+    corner = np.asarray(value, dtype=float)
+    reached = position.min(axis=0) if name == "lower" else position.max(axis=0)
+    return np.where(np.isfinite(corner), corner, reached)

@@ -237,8 +237,7 @@ class Simulation:
             self._executor = None
 
     def _report_nonfinite(self) -> None:
-        state = self.state
-        x, v = state.position.numpy(), state.velocity.numpy()
+        x, v = self.position, self.velocity  # copies: the state is about to be restored
         bad = ~(np.isfinite(x).all(axis=1) & np.isfinite(v).all(axis=1))
         row = int(np.argmax(bad)) if bad.any() else 0
         world = int(self.model.world_of[row])

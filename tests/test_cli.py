@@ -38,8 +38,9 @@ class Engine:
         Engine.last = self
         self.scene, self.settings, self.device, self.worlds = scene, settings, device, worlds
 
-    def run(self, frames, record, progress, overwrite):
+    def run(self, frames, record, progress, overwrite, fields):
         self.frames, self.record, self.overwrite = frames, record, overwrite
+        self.fields = tuple(fields)
         for frame in range(1, frames + 1):
             progress(frame, frames)
             if self.failure and frame == 2:
@@ -86,9 +87,11 @@ def particlesim_fails(capsys):
 def test_run_passes_everything_on(engine, scene_file, tmp_path, capsys):
     out = str(tmp_path / "out.usda")
     arguments = ["--frames", "5", "--out", out, "--device", "cpu", "--worlds", "3"]
+    arguments += ["--field", "density", "--field", "pressure"]
     assert cli.main(["run", scene_file(), *arguments]) == 0
     sim = engine.last
     assert (sim.frames, sim.record, sim.overwrite) == (5, out, False)
+    assert sim.fields == ("density", "pressure")
     assert (sim.device, sim.worlds, sim.settings.substeps) == ("cpu", 3, 4)
     output = capsys.readouterr()
     assert output.err == ""

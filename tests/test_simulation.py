@@ -229,7 +229,7 @@ def test_writing(precision, device):
     sim.step()
     np.testing.assert_allclose(sim.position, [(1, 3, 1)] * 3, rtol=1e-6)
     for wrong in (np.ones((2, 3)), np.nan, "there"):
-        with pytest.raises(ValueError, match="Simulation.set: position"):
+        with pytest.raises(ValueError, match=r"Simulation\.set: position"):
             sim.position = wrong
     np.testing.assert_allclose(sim.position, [(1, 3, 1)] * 3, rtol=1e-6)
 
@@ -243,7 +243,7 @@ def test_a_new_mass_is_felt(device):
     sim.set("mass", [1, 2, 3, 4])
     sim.step()
     np.testing.assert_allclose(sim.velocity[:, 1], [6, 3, 2, 0], rtol=1e-6)
-    with pytest.raises(ValueError, match="Simulation.set: mass must be above 0"):
+    with pytest.raises(ValueError, match=r"Simulation\.set: mass must be above 0"):
         sim.set("mass", [1, 0, 1, 1])
     np.testing.assert_array_equal(sim.get("mass"), [1, 2, 3, 4])
 

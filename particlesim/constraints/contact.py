@@ -119,12 +119,10 @@ class Contact(ConstraintBase):
         bouncing = self._column("restitution") > 0
         self.rough, self.bouncing = bool(rough.any()), bool(bouncing.any())
         Data, Shares = kernels.contact_types(precision)
-        self.copies = {"x": self.pairs.array(precision.vec3)}
+        self.copies = {k: self.pairs.array(precision.vec3) for k in ("x", "way")}
         self.copies |= {k: self.pairs.array(precision.scalar) for k in ("radius", "share")}
         if self.rough:
             self.copies["grip"] = self.pairs.array(precision.scalar)
-        if self.rough or self.bouncing:
-            self.copies["way"] = self.pairs.array(precision.vec3)
         if self.bouncing:
             self.copies["v"] = self.pairs.array(precision.vec3)
         self.Data = Data
@@ -219,7 +217,7 @@ class Contact(ConstraintBase):
             return
         model, data = self.model, self._data(dt)
         moving = not math.isinf(dt)
-        gather = kernels.gather_kernel(model.precision, self.compensated, self.rough)
+        gather = kernels.gather_kernel(model.precision, self.compensated)
         launch(
             gather,
             self.count,

@@ -10,7 +10,7 @@ import warp as wp
 from ..kernels.easing import easing_type
 from ..model import Model
 
-FRAMES = 5.0  # in which slack falls to 1/e, where the depenetration speed allows
+FRAMES = 30.0  # in which slack falls to 1/e, where the depenetration speed allows
 
 
 class Easing:
