@@ -114,9 +114,9 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
         y = x_ij - u
         y2 = wp.dot(y, y)
         through = wp.dot(y, x_ij) < real(0.0) and y2 > p.closest_squared
-        back = y * (real(1.0) / wp.sqrt(wp.where(through, y2, real(1.0))))
-        n = wp.where(through, back, n)
-        r = wp.where(through, wp.dot(back, x_ij), r)
+        turned = wp.where(through, real(1.0), real(0.0))
+        n = n * (real(1.0) - turned) + y * (turned / wp.sqrt(wp.where(through, y2, real(1.0))))
+        r = wp.where(through, wp.dot(n, x_ij), r)
         share = d.share[i] + d.share[j]
         soft = share + p.compliance * d.inverse_dt_squared
         active = touching and share > real(0.0)

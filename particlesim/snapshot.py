@@ -22,7 +22,8 @@ class Snapshot:
     """Copies of what a substep starts from."""
 
     def __init__(self, sim: Simulation):
-        self.sim = sim
+        # Not the simulation itself: it is to be let go as soon as nobody else holds it.
+        self.verlet = sim.neighbors.verlet
         model, state = sim.model, sim.state
         skip = TRANSIENT | set(model.attributes) - {"position", "velocity"}
         if not sim.integrator.carries_forces:
@@ -30,7 +31,7 @@ class Snapshot:
         self.arrays: dict[str, wp.array] = {
             name: array for name, array in state.arrays.items() if name not in skip
         }
-        for k, each in enumerate(sim.neighbors.verlet):
+        for k, each in enumerate(self.verlet):
             self.arrays[f"neighbors_{k}"] = each.x_listed
         for k, constraint in enumerate(sim.constraints):
             for name, array in constraint.persistent().items():
@@ -47,6 +48,6 @@ class Snapshot:
         """Go back; neighbour rows are made again from the positions that they were made from."""
         for name, array in self.arrays.items():
             wp.copy(array, self.copies[name])
-        for each in self.sim.neighbors.verlet:
+        for each in self.verlet:
             each.mark_all()
             each.rebuild()

@@ -52,6 +52,7 @@ class UsdWriter:
         ValueError: Another suffix, a field with a name that is taken or other than 1 or 3 numbers.
 
     Example:
+        >>> from particlesim.usd_info import PointsPrim
         >>> drops = PointsPrim(0, "drops", slice(0, 2), np.arange(2), 0.1, (0.2, 0.5, 0.9))
         >>> with UsdWriter("drops.usda", StageInfo(points=[drops], frames=2, fps=24)) as recorder:
         ...     for frame in range(2):

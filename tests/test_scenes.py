@@ -60,7 +60,7 @@ def test_dam_break_front_follows_the_experiment(device):
 
 
 def test_stars_keep_momentum_and_energy(device):
-    module, sim = simulate("star_collision", 0, device)
+    _, sim = simulate("star_collision", 0, device)
     before = sim.diagnostics()
     sim.run(10)
     after = sim.diagnostics()
