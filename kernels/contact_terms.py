@@ -115,8 +115,9 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
         y2 = wp.dot(y, y)
         through = wp.dot(y, x_ij) < real(0.0) and y2 > p.closest_squared
         turned = wp.where(through, real(1.0), real(0.0))
-        n = n * (real(1.0) - turned) + y * (turned / wp.sqrt(wp.where(through, y2, real(1.0))))
-        r = wp.where(through, wp.dot(n, x_ij), r)
+        kept = real(1.0) - turned
+        n = n * kept + y * (turned / wp.sqrt(y2 * turned + kept))
+        r = r * kept + wp.dot(n, x_ij) * turned
         share = d.share[i] + d.share[j]
         soft = share + p.compliance * d.inverse_dt_squared
         active = touching and share > real(0.0)

@@ -83,7 +83,7 @@ class Tait(EquationOfState):
     """A slightly compressible liquid, P = B ((rho/rho0)^gamma - 1), B = c^2 rho0 / gamma.
 
     Stores u = c^2/gamma ((s^(gamma-1) - 1)/(gamma - 1) + 1/s - 1), s = rho/rho0, from u = 0 at
-    rest (Cole 1948; Monaghan 1994, eq. 4.1). Density varies by about (speed/c)^2: choose c ten
+    rest (Cole 1948; Monaghan 1994). Density varies by about (speed/c)^2: choose c ten
     times the largest speed for one percent, and so the step (see ``SPH``).
 
     Args:

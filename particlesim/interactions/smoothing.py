@@ -76,7 +76,7 @@ def wendland_c2_line_slope(q: float):
 _CUBIC = (cubic_spline, cubic_spline_slope)
 _WENDLAND = (wendland_c2, wendland_c2_slope)
 
-# By name and dimension. Cubic spline: Monaghan and Lattanzio 1985; Monaghan 2005, eq. 2.6.
+# By name and dimension. Cubic spline: Monaghan and Lattanzio 1985.
 # Wendland C2: Wendland 1995; Dehnen and Aly 2012, table 1, with their H = 2 h.
 SMOOTHING: dict[str, dict[int, Smoothing]] = {
     "cubic_spline": {

@@ -11,7 +11,7 @@ from .. import validate
 from ..kernels import sph as kernels
 from ..kernels.pair import pair_kernel
 from ..launch import launch
-from ..neighbors import VerletList
+from ..neighbors import Neighbors, VerletList
 from .base import Interaction
 from .equations_of_state import EquationOfState
 from .interpolation import interpolate
@@ -21,7 +21,6 @@ from .viscosities import Viscosity
 
 if TYPE_CHECKING:
     from ..model import Model
-    from ..neighbors import Neighbors
     from ..state import State
 
 # What laws may name beside smoothing_length, rest_density and the parameters of their part.
@@ -40,14 +39,13 @@ class SPH(Interaction):
         rho_i = sum_j m_j W_ij                    (over all j within 2 h, i itself included)
         F_ij = -m_i m_j (P_i/rho_i^2 + P_j/rho_j^2 + Pi_ij) grad_i W_ij
 
-    with W_ij = W(|x_i - x_j|, h) (Gingold and Monaghan 1977; Monaghan 2005, eqs. 2.17 and 3.3;
-    Price 2012, eqs. 5 and 30). The pressure force is the exact gradient of the energy
+    with W_ij = W(|x_i - x_j|, h) (Gingold and Monaghan 1977; Monaghan 1992, eq. 3.3). The pressure force is the exact gradient of the energy
     sum_i m_i u(rho_i), so that momentum and angular momentum are conserved to round-off and the
     energy to the integrator's order; viscosity takes energy out. Coincident particles are pushed
     apart, equally and opposite.
 
     The step is bounded by the time of sound across a smoothing length and by the acceleration
-    (Monaghan 1992, sec. 10): dt < 0.4 h / (c (1 + 0.6 alpha)) and dt < 0.25 sqrt(h / |a|).
+    (Monaghan 1992, on time stepping): dt < 0.4 h / (c (1 + 0.6 alpha)) and dt < 0.25 sqrt(h / |a|).
 
     State arrays ``density`` and ``pressure`` belong to the positions at which the forces were
     taken last.
@@ -260,7 +258,7 @@ class SPH(Interaction):
     ) -> np.ndarray:
         """A field of the fluid anywhere: A(r) = sum_j m_j A_j / rho_j W(|r - r_j|, h).
 
-        (Monaghan 2005, eq. 2.7.) At the present positions of the simulation made last. Away from
+        (Monaghan 2005, sec. 2.) At the present positions of the simulation made last. Away from
         the fluid it is 0; at a free surface it falls to 0 over 2 h, like the sum of the weights.
 
         Args:
