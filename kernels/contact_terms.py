@@ -15,6 +15,7 @@ import warp as wp
 
 from .constraints import bodies_type, place_function
 from .contact import contact_types
+from .loops import reader
 from .precision import Precision, function
 
 
@@ -46,13 +47,17 @@ def crowding_term(precision: Precision, params: Any, bounce: bool) -> wp.Functio
     """Term: n n^T of a pair in contact, as its six entries; bounce: that approached at first."""
     vec3, real, six = precision.vec3, precision.scalar, precision.vector(6)
     Data, _ = contact_types(precision)
-    separation = _separation_function(precision)
+    separation, number, vector = (
+        _separation_function(precision),
+        reader(precision),
+        reader(precision, 3),
+    )
 
     def crowding(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
         r, n = separation(i, j, x_ij, r2, p.closest_squared)
-        weight = wp.where(r < d.radius[i] + d.radius[j], real(1.0), real(0.0))
+        weight = wp.where(r < number(d.radius, i) + number(d.radius, j), real(1.0), real(0.0))
         if wp.static(bounce):
-            approach = wp.dot(n, d.way[i] - d.way[j])
+            approach = wp.dot(n, vector(d.way, i) - vector(d.way, j))
             weight = wp.where(approach < real(0.0), weight, real(0.0))
         m = n * weight
         return six(m[0] * n[0], m[0] * n[1], m[0] * n[2], m[1] * n[1], m[1] * n[2], m[2] * n[2])
@@ -103,22 +108,25 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
     """
     vec3, real = precision.vec3, precision.scalar
     Data, _ = contact_types(precision)
-    separation = _separation_function(precision)
+    separation, number, vector = (
+        _separation_function(precision),
+        reader(precision),
+        reader(precision, 3),
+    )
 
     def push(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
         r, n = separation(i, j, x_ij, r2, p.closest_squared)
-        reach = d.radius[i] + d.radius[j]
+        reach = number(d.radius, i) + number(d.radius, j)
         touching = r < reach
-        u = d.way[i] - d.way[j]
+        u = vector(d.way, i) - vector(d.way, j)
         # A pair that has passed through each other goes back the way it came.
         y = x_ij - u
         y2 = wp.dot(y, y)
         through = wp.dot(y, x_ij) < real(0.0) and y2 > p.closest_squared
         turned = wp.where(through, real(1.0), real(0.0))
-        kept = real(1.0) - turned
-        n = n * kept + y * (turned / wp.sqrt(y2 * turned + kept))
-        r = r * kept + wp.dot(n, x_ij) * turned
-        share = d.share[i] + d.share[j]
+        n = n * (real(1.0) - turned) + y * (turned / wp.sqrt(wp.where(through, y2, real(1.0))))
+        r = wp.where(through, wp.dot(n, x_ij), r)
+        share = number(d.share, i) + number(d.share, j)
         soft = share + p.compliance * d.inverse_dt_squared
         active = touching and share > real(0.0)
         lam = wp.where(active, reach - r, real(0.0)) / wp.where(active, soft, real(1.0))
@@ -126,7 +134,7 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
         if wp.static(friction):
             t = u - n * wp.dot(u, n)
             length = wp.sqrt(wp.dot(t, t))
-            split = wp.max(d.grip[i] + d.grip[j], real(1.0e-30))
+            split = wp.max(number(d.grip, i) + number(d.grip, j), real(1.0e-30))
             limit = p.friction * lam / wp.max(length, real(1.0e-30))
             result = result - t * wp.min(real(1.0) / split, limit)
         return result
@@ -143,14 +151,18 @@ def bounce_term(precision: Precision, params: Any) -> wp.Function:
     """
     vec3, real = precision.vec3, precision.scalar
     Data, _ = contact_types(precision)
-    separation = _separation_function(precision)
+    separation, number, vector = (
+        _separation_function(precision),
+        reader(precision),
+        reader(precision, 3),
+    )
 
     def bounce(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
         _r, n = separation(i, j, x_ij, r2, p.closest_squared)
-        reach = d.radius[i] + d.radius[j]
-        share = d.share[i] + d.share[j]
-        before = wp.dot(d.way[i] - d.way[j], n)
-        missing = -p.restitution * before - wp.dot(d.v[i] - d.v[j], n)
+        reach = number(d.radius, i) + number(d.radius, j)
+        share = number(d.share, i) + number(d.share, j)
+        before = wp.dot(vector(d.way, i) - vector(d.way, j), n)
+        missing = -p.restitution * before - wp.dot(vector(d.v, i) - vector(d.v, j), n)
         touching = r2 < reach * reach and share > real(0.0)
         hit = touching and before < real(0.0) and missing > real(0.0)
         return n * (wp.where(hit, missing, real(0.0)) / wp.where(hit, share, real(1.0)))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import warp as wp
 
-from . import batch, validate
+from . import batch, checkpoint, validate
 from .diagnostics import Diagnostics, measure
 from .errors import SimulationError
 from .explain import Explanation, explain
@@ -348,6 +349,46 @@ class Simulation:
         for part in [*self.interactions, *self.constraints]:
             part.reset(chosen)
         self._unknown_forces.update(chosen)
+
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+        """Write a checkpoint: all that is needed to go on from here, bit for bit.
+
+        Args:
+            path: A ``.npz`` file; it appears whole or not at all.
+            overwrite: Replace an existing file.
+
+        Raises:
+            ValueError: Another suffix. FileExistsError: It exists, and ``overwrite`` is not set.
+            OSError: The folder is missing, or the file could not be written.
+        """
+        checkpoint.save(self, path, overwrite)
+
+    @classmethod
+    def load(
+        cls,
+        path: str | os.PathLike[str],
+        scene: Scene | Sequence[Scene],
+        settings: Settings | None = None,
+        device: Any = None,
+        worlds: int | None = None,
+    ) -> Self:
+        """The simulation that :meth:`save` wrote, on any device; on its kind, bit for bit.
+
+        Args:
+            path: The checkpoint.
+            scene: What was simulated. Its structure must be as it was (particle counts, groups,
+                kinds of interactions and constraints, their particles and tuples, the periodic
+                box); with other values of parameters the run goes on with those.
+            settings: None: as saved; else they must agree in ``dt``, ``integrator``,
+                ``precision`` and ``compensated``.
+            device: As for a new Simulation.
+            worlds: As for a new Simulation; None: as many copies of a single scene as were saved.
+
+        Raises:
+            ValueError: Scenes or settings of another kind, and files that are damaged, newer or
+                no checkpoint. OSError: The file is missing or cannot be read.
+        """
+        return checkpoint.load(cls, path, scene, settings, device, worlds)
 
     def diagnostics(self) -> Diagnostics:
         """Conserved quantities of every world at the present time."""

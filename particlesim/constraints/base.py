@@ -46,6 +46,10 @@ class ConstraintBase(Bindable):
         """Arrays that outlive a substep, for snapshots and checkpoints."""
         return {}
 
+    def readable(self) -> dict[str, wp.array]:
+        """Arrays of the last substep that users can read something from, for checkpoints."""
+        return {}
+
     def reset(self, worlds: Sequence[int]) -> None:
         """Forget what these worlds have left behind."""
 

@@ -231,6 +231,9 @@ class Constraint(ConstraintBase):
         breakable = self.count and self.break_force is not None
         return {"broken": self.struct.broken} if breakable else {}
 
+    def readable(self) -> dict[str, wp.array]:
+        return {"lam": self.struct.lam, "scale": self.scale} if self.count else {}
+
     def reset(self, worlds: Sequence[int]) -> None:
         for array in self.persistent().values():
             host = array.numpy().copy()

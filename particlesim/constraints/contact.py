@@ -38,11 +38,12 @@ class Contact(ConstraintBase):
     2020, eq. 34).
 
     What overlaps at the start, or after positions were written, does not explode: the particles
-    count as smaller, by just as much as to leave no overlap, and grow back to their size at no
-    more than ``Settings.depenetration_speed``.
+    count as smaller, by just as much as leaves no overlap, and grow back within some 30 frames, at
+    no more than ``Settings.depenetration_speed``. A particle that passes through the middle of
+    another in one substep is stopped where it came from; one that passes it altogether is missed.
 
-    A stack of layers rests on an overlap of about valence times layers times g dt^2, which smaller
-    substeps or more iterations reduce.
+    A stack rests on overlaps: those of the lowest layer are a few times layers times g dt^2, which
+    smaller substeps, or else more iterations, reduce.
 
     Args:
         group: Which particles touch each other; None: all. Those of radius 0 are points.
@@ -112,7 +113,8 @@ class Contact(ConstraintBase):
         precision = model.precision
         self.bodies = bodies(model, state)
         self.radius = state.radius
-        self.force = state.force if "force" in state else None
+        self.forced = "force" in state
+        self.force = state.force if self.forced else wp.empty(0, dtype=precision.vec3, device=model.device)
         self.compensated = "position_error" in state
         self.easing = Easing(model, state.count, precision.scalar, ends=2)
         rough, hard = self._column("friction") > 0, self._column("compliance") == 0
@@ -168,7 +170,7 @@ class Contact(ConstraintBase):
         model = self.model
         return pair_kernel(
             term, store(model.precision, self._Params), self.Data, self._Params, out, width,
-            model.precision, model.periodic, self.pairs.partners, model.device.is_cpu,
+            model.precision, model.periodic, self.pairs.partners, model.vectorised,
         )  # fmt: skip
 
     def _push_kernel(self, friction: bool) -> wp.Kernel:
@@ -233,14 +235,12 @@ class Contact(ConstraintBase):
         if not self.count or not self.bouncing or dt <= 0:
             return
         model, data = self.model, self._data(dt)
-        precision = model.precision
-        gather = kernels.gather_bounce_kernel(precision, self.compensated, self.force is not None)
-        force = wp.empty(0, dtype=precision.vec3) if self.force is None else self.force
+        gather = kernels.gather_bounce_kernel(model.precision, self.compensated, self.forced)
         launch(
             gather,
             self.count,
-            [self.pairs.pairs, self.bodies, force, self.radius, self.easing.slack, dt, 1.0 / dt,
-             data],
+            [self.pairs.pairs, self.bodies, self.force, self.radius, self.easing.slack, dt,
+             1.0 / dt, data],
             model.device,
         )  # fmt: skip
         self._sum(self.count_bounces, self.bounces[1], data, self.bounce_shares)

@@ -39,10 +39,10 @@ class SPH(Interaction):
         rho_i = sum_j m_j W_ij                    (over all j within 2 h, i itself included)
         F_ij = -m_i m_j (P_i/rho_i^2 + P_j/rho_j^2 + Pi_ij) grad_i W_ij
 
-    with W_ij = W(|x_i - x_j|, h) (Gingold and Monaghan 1977; Monaghan 1992, eq. 3.3). The pressure force is the exact gradient of the energy
-    sum_i m_i u(rho_i), so that momentum and angular momentum are conserved to round-off and the
-    energy to the integrator's order; viscosity takes energy out. Coincident particles are pushed
-    apart, equally and opposite.
+    with W_ij = W(|x_i - x_j|, h) (Gingold and Monaghan 1977; Monaghan 1992, eq. 3.3). The pressure
+    force is the exact gradient of the energy sum_i m_i u(rho_i), so that momentum and angular
+    momentum are conserved to round-off and the energy to the integrator's order; viscosity takes
+    energy out. Coincident particles are pushed apart, equally and opposite.
 
     The step is bounded by the time of sound across a smoothing length and by the acceleration
     (Monaghan 1992, on time stepping): dt < 0.4 h / (c (1 + 0.6 alpha)) and dt < 0.25 sqrt(h / |a|).

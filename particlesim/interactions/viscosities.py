@@ -52,11 +52,10 @@ class ArtificialViscosity(Viscosity):
     """Pi_ij = (-alpha c mu + beta mu^2) / rho, mu = h v_ij.x_ij / (r^2 + 0.01 h^2).
 
     Where v_ij.x_ij < 0, with the means of c and rho over the pair; pairs that recede feel nothing
-    (Monaghan 1992, eqs. 4.1 and 4.2). It conserves momentum and angular momentum and turns kinetic energy
-    into heat that nobody keeps. In shear it is a kinematic viscosity of about
-    alpha c h / (4 (d + 2)) in d dimensions, measured within 5 %: half of the alpha c h / 10 in
-    three (Lodato and Price 2010) and alpha c h / 8 in two that it would be if receding pairs felt
-    it too.
+    (Monaghan 1992, eqs. 4.1 and 4.2). It conserves momentum and angular momentum and turns kinetic
+    energy into heat that nobody keeps. In shear it is a kinematic viscosity of about
+    alpha c h / (4 (d + 2)) in d dimensions (in two, measured within 5 %): half of what it would be
+    if receding pairs felt it too, alpha c h / 10 in three dimensions (Lodato and Price 2010).
 
     Args:
         alpha: Strength of the part linear in the speed, at least 0.
