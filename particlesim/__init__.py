@@ -31,6 +31,7 @@ from .record import UsdRecorder
 from .scene import Group, Scene
 from .settings import Settings
 from .simulation import Simulation
+from .tradeoff import Tradeoff, tradeoff
 
 __version__ = "0.1.0"
 
@@ -60,8 +61,10 @@ __all__ = [
     "SimulationError",
     "Springs",
     "Tait",
+    "Tradeoff",
     "UniformGravity",
     "UsdRecorder",
     "law",
     "sample",
+    "tradeoff",
 ]

@@ -43,6 +43,7 @@ def save(sim: Simulation, path: str | os.PathLike[str], overwrite: bool) -> None
     from . import __version__
 
     target = _writable(path, overwrite)
+    arrays = {name: array.numpy() for name, array in contents(sim).items()}
     header = {
         "format": FORMAT,
         "format_version": VERSION,
@@ -52,9 +53,9 @@ def save(sim: Simulation, path: str | os.PathLike[str], overwrite: bool) -> None
         "settings": dataclasses.asdict(sim.settings),
         "copies": all(scene is sim.scenes[0] for scene in sim.scenes),
         "scenes": fingerprint(sim.scenes),
+        "arrays": list(arrays),
     }
     text = json.dumps(header, default=lambda number: number.item()).encode()
-    arrays = {name: array.numpy() for name, array in contents(sim).items()}
     _publish(target, {HEADER: np.frombuffer(text, np.uint8), **arrays})
 
 
@@ -204,7 +205,7 @@ def _read(source: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Header and arrays of a file, every byte of them checked."""
     owner = "Simulation.load"
     try:
-        file = open(source, "rb")  # noqa: SIM115: what fails inside the block is another matter
+        file = open(source, "rb")  # noqa: SIM115, what fails within is told apart
     except OSError as error:
         raise type(error)(
             f"{owner}: path must be a file that can be read, got {str(source)!r} "
@@ -217,10 +218,8 @@ def _read(source: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
                 if header["format"] != FORMAT:
                     raise ValueError(f"format {header['format']!r}")
                 if header["format_version"] <= VERSION:
-                    names = [name.removesuffix(".npy") for name in archive.namelist()]
-                    arrays = {name: _entry(archive, f"{name}.npy") for name in names}
-                    del arrays[HEADER]
-                    return header, arrays
+                    names = header["arrays"]
+                    return header, {name: _entry(archive, f"{name}.npy") for name in names}
         except Exception as error:  # bytes may be anything, and their readers raise as much
             raise ValueError(
                 f"{owner}: path must be a whole checkpoint written by Simulation.save, got "

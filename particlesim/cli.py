@@ -1,4 +1,4 @@
-"""The command line: list, run and explain scenes (see :mod:`particlesim.scene_files`).
+"""The command line: list, run, explain and measure scenes (see :mod:`particlesim.scene_files`).
 
 Exit codes: 0 done, 1 a run that failed, 2 arguments that do not fit, 130 interrupted. Whatever goes
 wrong is one line on stderr. Warp and USD are imported only when a scene is, so that help is quick.
@@ -166,6 +166,67 @@ def explain(
         typer.echo(str(sim.explain()))
 
 
+@app.command()
+def tradeoff(
+    scene: SceneName,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE,...", help="Values of a setting or option; repeat."),
+    ] = None,
+    options: Options = None,
+    frames: Annotated[
+        int | None, typer.Option(min=1, help="Frames to run. Default: the scene's own, or 240.")
+    ] = None,
+    repeats: Annotated[int, typer.Option(min=1, help="Timed runs of each setting.")] = 3,
+    error: Annotated[
+        str | None,
+        typer.Option(help="known, converged, energy or momentum. Default: known if it is."),
+    ] = None,
+    reference: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="What the converged reference takes; repeat."),
+    ] = None,
+    bound: Annotated[
+        float | None, typer.Option(help="Error beyond which a setting counts as diverged.")
+    ] = None,
+    plot: Annotated[Path | None, typer.Option(help="Picture to draw, .png, .svg, .pdf.")] = None,
+    save: Annotated[Path | None, typer.Option(help="Table to write, .json or .csv.")] = None,
+    device: Device = None,
+    precision: Precision = None,
+    substeps: Substeps = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace outputs that exist.")
+    ] = False,
+    debug: Debug = False,
+) -> None:
+    """Measure what settings cost, and how accurate they are."""
+    meter = Meter()
+    with _one_line_errors(meter, debug):
+        from .tradeoff import command
+        from .tradeoff.bar import bar
+
+        command.check_outputs({"--plot": plot, "--save": save}, overwrite)
+        if not debug:
+            _start_warp_quietly()
+        module = load_scene(scene)
+        with bar(label(module)) as show:
+
+            def progress(done: int, total: int) -> None:
+                meter.done, meter.frames = done, total
+                show(done, total)
+
+            table = command.sweep(
+                module, _assignments(options, precision, substeps), vary or (), error,
+                reference or (), frames=frames, repeats=repeats, bound=bound, device=device,
+                progress=progress,
+            )  # fmt: skip
+        typer.echo(str(table))
+        if save is not None:
+            table.save(save, overwrite=overwrite)
+        if plot is not None:
+            table.plot(plot, overwrite=overwrite)
+
+
 def _assignments(
     options: list[str] | None, precision: str | None, substeps: int | None
 ) -> list[str]:
@@ -237,6 +298,8 @@ def _describe(error: Exception) -> str:
     if isinstance(error, OSError) and error.filename and error.strerror:
         return f"{error.filename}: {error.strerror}"
     if isinstance(error, ValueError | OSError | RuntimeError) and str(error):
+        return str(error)
+    if isinstance(error, ImportError) and error.name is None:  # an extra that is not installed
         return str(error)
     # Not written to be read alone: say what it is, and where the scene, or else the engine, was.
     text = f"{type(error).__name__}: {error}"

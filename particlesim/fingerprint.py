@@ -63,9 +63,7 @@ def _compare(where: str, saved: Any, given: Any) -> tuple[str, Any, Any] | None:
             for name in {**saved, **given}
         )
     elif isinstance(saved, list) and isinstance(given, list) and len(saved) == len(given):
-        pairs = (
-            (f"{where}[{k}]", a, b) for k, (a, b) in enumerate(zip(saved, given, strict=True))
-        )
+        pairs = ((f"{where}[{k}]", a, b) for k, (a, b) in enumerate(zip(saved, given, strict=True)))
     else:
         return None if saved == given else (where, _names(saved), _names(given))
     return next((found for each in pairs if (found := _compare(*each))), None)

@@ -13,11 +13,12 @@ import warp as wp
 from . import batch, checkpoint, validate
 from .diagnostics import Diagnostics, measure
 from .errors import SimulationError
+from .executors import Executor
 from .explain import Explanation, explain
 from .integrators import METHODS
 from .interactions.fusion import fuse
 from .kernels.reduce import finite_kernel
-from .launch import Executor, Frame, launch, owner, record
+from .launch import Frame, launch, owner, record
 from .model import Model
 from .neighbors import Neighbors
 from .scene import Scene

@@ -8,16 +8,8 @@ import warp as wp
 
 import particlesim as ps
 from particlesim import launch
-from particlesim.launch import (
-    CHUNK,
-    EagerExecutor,
-    Frame,
-    GraphExecutor,
-    Launch,
-    Program,
-    ThreadExecutor,
-    When,
-)
+from particlesim.executors import EagerExecutor, GraphExecutor, ThreadExecutor
+from particlesim.launch import CHUNK, Frame, Launch, Program, When
 
 WAYS = [("graph", None), ("threads", 1), ("threads", 2), ("threads", 3), ("auto", 2)]
 
@@ -78,11 +70,11 @@ def test_auto_needs_no_trial_where_threads_cannot_pay(count, threads):
 def test_a_simulation_takes_its_threads_with_it(melt):
     sim = melt("threads", 3)
     sim.step()
-    first = sim.executor.chosen._workers
+    first = sim.executor.chosen.team.workers
     assert len(first) == 2  # beside the calling thread
     sim.close()
     sim.step()  # with threads anew
-    second = sim.executor.chosen._workers
+    second = sim.executor.chosen.team.workers
     last = weakref.ref(sim)
     del sim
     assert last() is None  # without waiting for the garbage collector
@@ -193,6 +185,7 @@ def test_an_error_in_a_worker_is_raised():
     with launch.record(Program()) as program:
         launch.launch(add_one, len(values), [values], values.device)
     executor = ThreadExecutor(Frame(repeat=1, substep=program), 2)
+    executor._shared[id(program.operations[0])] = True  # as if it had taken long
     program.operations[0].commands[0] = Failing()
     with pytest.raises(RuntimeError, match="no such thing"):
         executor.run()

@@ -70,7 +70,9 @@ class Boundary(ConstraintBase):
         self.bodies, self.radius = bodies(model, state), state.radius
         self.easing = Easing(model, self.count, self._slack_type(model), ends=1)
         forces = "force" in state
-        self.force = state.force if forces else wp.empty(0, dtype=model.precision.vec3, device=model.device)
+        self.force = (
+            state.force if forces else wp.empty(0, dtype=model.precision.vec3, device=model.device)
+        )
         self.ease, self.push, self.bounce = self._kernels(
             model.precision, self.Params, "position_error" in state, forces
         )

@@ -114,7 +114,9 @@ class Contact(ConstraintBase):
         self.bodies = bodies(model, state)
         self.radius = state.radius
         self.forced = "force" in state
-        self.force = state.force if self.forced else wp.empty(0, dtype=precision.vec3, device=model.device)
+        self.force = (
+            state.force if self.forced else wp.empty(0, dtype=precision.vec3, device=model.device)
+        )
         self.compensated = "position_error" in state
         self.easing = Easing(model, state.count, precision.scalar, ends=2)
         rough, hard = self._column("friction") > 0, self._column("compliance") == 0
