@@ -63,25 +63,31 @@ class Settings:
 
     def __post_init__(self) -> None:
         owner = "Settings"
-        validate.number(owner, "dt", self.dt, minimum=0.0, unit="s")
-        validate.whole(owner, "substeps", self.substeps, minimum=1)
-        validate.whole(owner, "iterations", self.iterations, minimum=1)
+        checked: dict[str, Any] = {
+            "dt": validate.number(owner, "dt", self.dt, minimum=0.0, unit="s"),
+            "substeps": validate.whole(owner, "substeps", self.substeps, minimum=1),
+            "iterations": validate.whole(owner, "iterations", self.iterations, minimum=1),
+            "relaxation": validate.number(
+                owner, "relaxation", self.relaxation, above=0.0, maximum=1.0
+            ),
+        }
         validate.choice(owner, "integrator", self.integrator, INTEGRATORS)
         validate.choice(owner, "precision", self.precision, PRECISIONS)
         validate.choice(owner, "execution", self.execution, EXECUTIONS)
-        validate.number(owner, "relaxation", self.relaxation, above=0.0, maximum=1.0)
         if self.skin is not None:
-            validate.number(owner, "skin", self.skin, minimum=0.0, unit="length")
+            checked["skin"] = validate.number(owner, "skin", self.skin, minimum=0.0, unit="length")
         if self.depenetration_speed is not None:
-            validate.number(
+            checked["depenetration_speed"] = validate.number(
                 owner, "depenetration_speed", self.depenetration_speed, above=0.0, unit="length/s"
             )
         if self.threads is not None:
-            validate.whole(owner, "threads", self.threads, minimum=1)
+            checked["threads"] = validate.whole(owner, "threads", self.threads, minimum=1)
         if not isinstance(self.compensated, bool):
             raise validate.fail(
                 owner, "compensated", "be True or False", self.compensated, "choose one"
             )
+        for name, value in checked.items():  # plain numbers, whatever kind was given
+            object.__setattr__(self, name, value)
 
     @property
     def substep(self) -> float:

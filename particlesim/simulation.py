@@ -300,6 +300,12 @@ class Simulation:
         host[rows] = validate.rows("Simulation.set", name, value, shape[0], width)
         if name == "mass":
             self._invert(host, rows)
+        if name == "radius" and host.max() > self.model.column("radius").max():
+            raise validate.fail(
+                "Simulation.set", "radius", "be at most the largest at the start, which contacts "
+                f"are looked for by ({self.model.column('radius').max():g})", float(host.max()),
+                "give the scene the largest radius it will have",
+            )  # fmt: skip
         array.assign(host)
         error = f"{name}_error"
         if error in self.state:

@@ -44,7 +44,7 @@ def least_gap(x, radius):
     return r[~np.eye(len(x), dtype=bool)].min()
 
 
-def sweep(x, way, w, radius, friction, soft, length=0.0):
+def sweep(x, way, w, radius, friction, length=0.0):
     """Corrections of one sweep over all contacts, pair by pair."""
     count = len(x)
     d = x[:, None] - x[None]
@@ -65,14 +65,18 @@ def sweep(x, way, w, radius, friction, soft, length=0.0):
         split, grip = crowding / (1 - a + 0.75 * a**2), contacts / (1 - 0.75 * a)
     total = np.zeros((count, 3))
     for i, j in touching:
-        n = d[i, j] / r[i, j]
-        share = w[i] * split[i] + w[j] * split[j]
-        lam = (radius[i] + radius[j] - r[i, j]) / (share + soft)
-        total[i] += lam * n
+        n, at = d[i, j] / r[i, j], r[i, j]
         u = way[i] - way[j]
+        came = d[i, j] - u
+        if came @ d[i, j] < 0:  # through the middle: back
+            n = came / np.linalg.norm(came)
+            at = n @ d[i, j]
+        share = w[i] * split[i] + w[j] * split[j]
+        lam = (radius[i] + radius[j] - at) / share if share else 0.0
+        total[i] += lam * n
         t = u - (u @ n) * n
         slip = np.linalg.norm(t)
-        if friction and slip > 0:
+        if friction and slip > 0 and share:
             total[i] -= t * min(1 / (w[i] * grip[i] + w[j] * grip[j]), friction * lam / slip)
     return w[:, None] * total
 
@@ -93,7 +97,7 @@ def test_sweeps_equal_numpy(count, length, friction, precision, device):
     w = np.where(np.arange(count) < 5, 0.0, 1 / given["mass"])
     way = h * given["velocity"]
     for _ in range(2):
-        way += sweep(x + way, way, w, radius, friction, 0.0, length)
+        way += sweep(x + way, way, w, radius, friction, length)
     assert np.abs(way - h * given["velocity"]).max() > 0.01  # there are contacts
     moved = sim.position - x
     if length:

@@ -1,0 +1,95 @@
+"""Gravity against Kepler, and the figure eight of three bodies (G = 1)."""
+
+import numpy as np
+import pytest
+
+import particlesim as ps
+
+
+def orbit(eccentricity, steps, device, orbits=10):
+    """Relative energies of every step, and the distance from the start after whole orbits."""
+    e = eccentricity
+    scene = ps.Scene()
+    scene.add_particles([(0, 0, 0)], pinned=True)
+    scene.add_particles([(1 - e, 0, 0)], velocity=(0, np.sqrt((1 + e) / (1 - e)), 0))
+    scene.add_interaction(ps.Gravity(constant=1.0))
+    settings = ps.Settings(
+        dt=2 * np.pi / steps, substeps=1, integrator="velocity_verlet", precision="float64"
+    )
+    sim = ps.Simulation(scene, settings, device=device)
+    energy = []
+    for _ in range(orbits * steps):
+        sim.step()
+        x, v = sim.position[1], sim.velocity[1]
+        energy.append(0.5 * v @ v - 1 / np.linalg.norm(x))
+    assert sim.diagnostics().energy[0] == pytest.approx(energy[-1], rel=1e-14)
+    error = np.linalg.norm(sim.position[1] - scene.position[1])
+    return np.abs(np.array(energy) / -0.5 - 1).max(), error
+
+
+# Ten orbits by kick, drift, kick in float64: largest |dE/E| and the error of the position.
+KEPLER = {
+    (0.5, 100): (1.08e-2, 1.32), (0.5, 1000): (1.07e-4, 1.77e-2),
+    (0.0, 100): (3.9e-6, 8.3e-2), (0.0, 1000): (3.9e-10, 8.3e-4),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("eccentricity", "steps"), KEPLER)
+def test_kepler(eccentricity, steps, device):
+    energy, position = orbit(eccentricity, steps, device)
+    # To the digits given: 3, and 2 for the circle, half of the last one.
+    digits = 0.005 if eccentricity else 0.015
+    known = KEPLER[eccentricity, steps]
+    assert energy == pytest.approx(known[0], rel=digits)
+    assert position == pytest.approx(known[1], rel=digits)
+
+
+def test_kepler_is_of_second_order(device):
+    # A tenth of the step is a hundredth of the error, at 1000 steps an orbit and beyond.
+    coarse = orbit(0.5, 1000, device, orbits=1)
+    fine = orbit(0.5, 2000, device, orbits=1)
+    assert np.log2(coarse[0] / fine[0]) == pytest.approx(2, abs=0.02)
+    assert np.log2(coarse[1] / fine[1]) == pytest.approx(2, abs=0.02)
+
+
+def test_figure_eight(device):
+    # Chenciner and Montgomery (2000): E = -1.28714199177, L = 0, back after T = 6.32591398.
+    period, frames = 6.32591398, 100
+    first = np.array([0.97000436, -0.24308753, 0.0])
+    third = np.array([-0.93240737, -0.86473146, 0.0])
+    start = np.array([first, -first, 0 * first])
+    scene = ps.Scene()
+    scene.add_particles(start, velocity=[-third / 2, -third / 2, third])
+    scene.add_interaction(ps.Gravity(constant=1.0))
+    settings = ps.Settings(
+        dt=period / frames, substeps=100, integrator="velocity_verlet", precision="float64"
+    )
+    sim = ps.Simulation(scene, settings, device=device)
+    before = sim.diagnostics()
+    # The start is given to 8 digits, and the energy follows from it to the 11 that are known.
+    assert before.energy[0] == pytest.approx(-1.28714199177, abs=5e-12 * 100)
+    assert np.abs(before.angular_momentum).max() < 1e-15
+    sim.run(frames // 3)
+    assert np.abs(sim.position - start).max() > 0.5
+    sim.run(frames - frames // 3)
+    # Leapfrog of 10^4 steps: (dt)^2 = 4e-7 times accelerations and their rates, near 1.
+    assert np.abs(sim.position - start).max() < 4e-6
+    after = sim.diagnostics()
+    assert after.energy[0] == pytest.approx(before.energy[0], rel=1e-9)
+    assert np.abs(after.angular_momentum).max() < 1e-13
+    assert np.abs(after.momentum).max() < 1e-13
+
+
+def test_a_uniform_sphere_holds_three_fifths(device):
+    # U = -3/5 G M^2 / R for a full sphere; N points of equal mass miss their own cells, each of
+    # which would add the self energy of a cell of volume 4 pi / 3 N: a factor 1 - O(N^(-2/3)),
+    # and the sampled sum scatters by 1 / sqrt(N).
+    n = 4000
+    x = ps.sample.uniform_sphere((0, 0, 0), 1.0, n, seed=0)
+    scene = ps.Scene()
+    scene.add_particles(x, mass=1 / n)
+    scene.add_interaction(ps.Gravity(constant=1.0))
+    found = ps.Simulation(scene, ps.Settings(precision="float64"), device=device).diagnostics()
+    assert found.potential[0] == pytest.approx(-3 / 5, rel=n ** (-2 / 3) + 1 / np.sqrt(n))
+    # Scale-free forces: the virial sum is the energy.
+    assert found.virial[0] == pytest.approx(found.potential[0], rel=1e-12)
