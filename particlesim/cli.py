@@ -50,6 +50,10 @@ Worlds = Annotated[
 ]
 Precision = Annotated[str | None, typer.Option(help="float32 or float64, in every kernel.")]
 Substeps = Annotated[int | None, typer.Option(min=1, help="Substeps a frame.")]
+Frames = Annotated[
+    int | None, typer.Option(min=1, help="Frames to run. Default: the scene's own, or 240.")
+]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace outputs that exist.")]
 Debug = Annotated[bool, typer.Option("--debug", hidden=True, help="Show tracebacks.")]
 
 
@@ -99,9 +103,7 @@ def list_scenes(debug: Debug = False) -> None:
 @app.command()
 def run(
     scene: SceneName,
-    frames: Annotated[
-        int | None, typer.Option(min=1, help="Frames to run. Default: the scene's own, or 240.")
-    ] = None,
+    frames: Frames = None,
     out: Annotated[Path | None, typer.Option(help="USD file to write, .usda.")] = None,
     options: Options = None,
     device: Device = None,
@@ -112,9 +114,7 @@ def run(
         list[str] | None,
         typer.Option("--field", metavar="NAME", help="Write this array too, as density; repeat."),
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace an output that exists.")
-    ] = False,
+    overwrite: Overwrite = False,
     debug: Debug = False,
 ) -> None:
     """Run a scene, and write its frames into a USD file."""
@@ -174,9 +174,7 @@ def tradeoff(
         typer.Option(metavar="NAME=VALUE,...", help="Values of a setting or option; repeat."),
     ] = None,
     options: Options = None,
-    frames: Annotated[
-        int | None, typer.Option(min=1, help="Frames to run. Default: the scene's own, or 240.")
-    ] = None,
+    frames: Frames = None,
     repeats: Annotated[int, typer.Option(min=1, help="Timed runs of each setting.")] = 3,
     error: Annotated[
         str | None,
@@ -186,45 +184,27 @@ def tradeoff(
         list[str] | None,
         typer.Option(metavar="NAME=VALUE", help="What the converged reference takes; repeat."),
     ] = None,
-    bound: Annotated[
-        float | None, typer.Option(help="Error beyond which a setting counts as diverged.")
-    ] = None,
+    bound: Annotated[float | None, typer.Option(help="Error that counts as diverged.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Picture to draw, .png, .svg, .pdf.")] = None,
     save: Annotated[Path | None, typer.Option(help="Table to write, .json or .csv.")] = None,
     device: Device = None,
-    precision: Precision = None,
-    substeps: Substeps = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace outputs that exist.")
-    ] = False,
+    overwrite: Overwrite = False,
     debug: Debug = False,
 ) -> None:
     """Measure what settings cost, and how accurate they are."""
     meter = Meter()
     with _one_line_errors(meter, debug):
         from .tradeoff import command
-        from .tradeoff.bar import bar
 
         command.check_outputs({"--plot": plot, "--save": save}, overwrite)
         if not debug:
             _start_warp_quietly()
-        module = load_scene(scene)
-        with bar(label(module)) as show:
-
-            def progress(done: int, total: int) -> None:
-                meter.done, meter.frames = done, total
-                show(done, total)
-
-            table = command.sweep(
-                module, _assignments(options, precision, substeps), vary or (), error,
-                reference or (), frames=frames, repeats=repeats, bound=bound, device=device,
-                progress=progress,
-            )  # fmt: skip
+        table = command.sweep(
+            load_scene(scene), options or (), vary or (), error, reference or (), meter,
+            frames=frames, repeats=repeats, bound=bound, device=device,
+        )  # fmt: skip
         typer.echo(str(table))
-        if save is not None:
-            table.save(save, overwrite=overwrite)
-        if plot is not None:
-            table.plot(plot, overwrite=overwrite)
+        command.write(table, plot, save)
 
 
 def _assignments(

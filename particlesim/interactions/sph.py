@@ -11,7 +11,8 @@ from .. import validate
 from ..kernels import sph as kernels
 from ..kernels.pair import pair_kernel
 from ..launch import launch
-from ..neighbors import Neighbors, VerletList
+from ..neighbors import Neighbors
+from ..verlet import VerletList
 from .base import Interaction
 from .equations_of_state import EquationOfState
 from .interpolation import interpolate

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import inspect
+import sys
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ..scene_files import parse_options, split_options
+from ..progress import Meter
+from ..scene_files import label, parse_options, split_options
 from . import output, plot
+from .bar import bar
 from .sweep import ERRORS, tradeoff
 from .table import Tradeoff
 
@@ -73,9 +78,20 @@ def sweep(
     vary: Sequence[str],
     error: str | None,
     reference: Sequence[str],
+    meter: Meter,
     **arguments: Any,
 ) -> Tradeoff:
-    """Run the sweep that the command line describes."""
+    """Run the sweep that the command line describes.
+
+    Args:
+        module: The scene's.
+        assignments: ``NAME=VALUE`` of what does not vary.
+        vary: ``NAME=VALUE,VALUE,...`` of what does.
+        error: Name of the error, or None.
+        reference: ``NAME=VALUE`` of the reference.
+        meter: Counts the frames.
+        **arguments: Of :func:`tradeoff`.
+    """
     if error is not None and error not in ERRORS:
         raise ValueError(
             f"--error must be one of {', '.join(ERRORS)}, got {error!r}; choose one of these."
@@ -88,13 +104,33 @@ def sweep(
         )
     fixed = parse_options(assignments)
     # An option that build needs is set by being varied.
-    options, knobs = split_options(module, {**{n: v[0] for n, v in varied.items()}, **fixed})
-    return tradeoff(
-        module.build,
-        varied,
-        error=error,
-        reference=parse_options(reference) or None,
-        settings=module.settings.replace(**{n: v for n, v in knobs.items() if n in fixed}),
-        options={name: value for name, value in options.items() if name in fixed},
-        **arguments,
-    )
+    needed = [name for name in inspect.signature(module.build).parameters if name in varied]
+    options, knobs = split_options(module, {**{n: varied[n][0] for n in needed}, **fixed})
+    with bar(label(module)) as show, warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+
+        def progress(done: int, total: int) -> None:
+            meter.done, meter.frames = done, total
+            show(done, total)
+
+        table = tradeoff(
+            module.build,
+            varied,
+            error=error,
+            reference=parse_options(reference) or None,
+            settings=module.settings.replace(**knobs),
+            options={name: value for name, value in options.items() if name in fixed},
+            progress=progress,
+            **arguments,
+        )
+    for warning in caught:
+        print(f"warning: {' '.join(str(warning.message).split())}", file=sys.stderr)
+    return table
+
+
+def write(table: Tradeoff, picture: Path | None, file: Path | None) -> None:
+    """Write what was asked for; that it may be replaced has been checked."""
+    if file is not None:
+        table.save(file, overwrite=True)
+    if picture is not None:
+        table.plot(picture, overwrite=True)

@@ -97,7 +97,6 @@ class Converged(Judge):
                 raise SimulationError(f"{OWNER}: the reference has diverged; give a finer one.")
             self._compare(alive, before)
             return
-        size = np.ptp(alive[0].sim.position, axis=0).max() + np.abs(alive[0].sim.position).max()
         for _ in range(REFINEMENTS):
             self._refine()
             x = self._positions(alive[0].sim)
@@ -105,7 +104,7 @@ class Converged(Judge):
                 self._compare(alive, x)
                 self.change = math.inf if before is None else distance(alive[0].sim, x, before)
                 least = min((run.error for run in alive if math.isfinite(run.error)), default=0.0)
-                if self.change <= max(SHARE * least, ROUND_OFF * float(size)):
+                if self.change <= max(SHARE * least, ROUND_OFF * np.abs(x).max(initial=0.0)):
                     return
             before = x
         self._complain(before)
@@ -151,6 +150,10 @@ class Converged(Judge):
     def _compare(self, runs: Sequence[Run], x: np.ndarray) -> None:
         for run in runs:
             run.error = distance(run.sim, run.notes["position"], x)
+        start = np.concatenate([scene.position for scene in runs[0].sim.scenes])
+        size = float(np.sqrt(((x - x.mean(axis=0)) ** 2).sum(axis=1).mean())) if len(x) else 0.0
+        # Farther off than ten times what there is to be seen is no longer an inaccuracy.
+        self.bound = 10.0 * max(size, distance(runs[0].sim, x, start)) or math.inf
 
     def describe(self) -> str:
         text = "rms distance from "

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from .plan import OWNER
 from .run import Run
 
 
@@ -48,10 +50,21 @@ class Known(Judge):
         self.function = function
 
     def finish(self, run: Run) -> None:
+        run.notes["ended"] = True
         with np.errstate(all="ignore"):
             run.error = abs(float(self.function(run.sim)))
         if not math.isfinite(run.error):
             run.cause = f"error must be finite, got {run.error} at t = {run.sim.time:g}"
+
+    def judge(self, runs: Sequence[Run]) -> None:
+        ended = [run for run in runs if run.notes.get("ended")]
+        if ended and all(run.cause for run in ended):
+            warnings.warn(
+                f"{OWNER}: error must be finite for one setting at least, got "
+                f"{ended[0].error} for all that reached t = {ended[0].sim.time:g}; choose frames "
+                "for which the answer is known, or another error.",
+                stacklevel=4,
+            )
 
     def describe(self) -> str:
         return "against the known answer"

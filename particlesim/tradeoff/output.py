@@ -133,7 +133,7 @@ def text(table: Tradeoff) -> str:
 
 
 def _heading(table: Tradeoff) -> list[str]:
-    runs = "run" if table.repeats == 1 else f"median of {table.repeats} runs"
+    runs = "1 run" if table.repeats == 1 else f"median of {table.repeats} runs"
     return [
         f"{table.scene}: {table.duration:g} s on {table.device}, {runs}",
         f"error: {table.error}",

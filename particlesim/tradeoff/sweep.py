@@ -55,8 +55,8 @@ def tradeoff(
         frames: Frames of ``settings.dt``. None: those of the module, or 240.
         settings: The knobs that do not vary. None: those of the module, or Settings().
         options: Options of ``build`` that do not vary.
-        bound: Error beyond which a setting counts as diverged. None: 10 for drifts (ten times
-            what the motion amounts to), infinite otherwise.
+        bound: Error beyond which a setting counts as diverged. None: ten times what the
+            motion and the size of the scene amount to, for known answers infinite.
         device: As for Simulation.
         progress: True for a bar on the terminal, or a function of (frames done, all frames).
 
@@ -85,14 +85,15 @@ def tradeoff(
     plans = study.plans(vary)
     repeats = validate.whole(OWNER, "repeats", repeats, minimum=1)
     judge = choose_judge(study, plans, error, reference)
-    limit = judge.bound
     if bound is not None:
-        limit = validate.number(OWNER, "bound", bound, above=0.0, infinite=True)
+        bound = validate.number(OWNER, "bound", bound, above=0.0, infinite=True)
     runs = [Run(plan, study.simulation(plan)) for plan in plans]
     with contextlib.ExitStack() as stack:
         if progress is True:
             progress = stack.enter_context(bar(study.label))
-        measure(runs, judge, limit, repeats, progress if callable(progress) else None)
+        measure(runs, judge, repeats, progress if callable(progress) else None)
+    limit = judge.bound if bound is None else bound
+    mark(runs, limit)
     return Tradeoff(
         scene=study.label,
         error=judge.describe(),
@@ -130,9 +131,7 @@ def choose_judge(study: Study, plans: Sequence[Plan], error: Any, reference: Any
     return EnergyDrift() if error == "energy" else MomentumDrift()
 
 
-def measure(
-    runs: Sequence[Run], judge: Judge, bound: float, repeats: int, progress: Progress | None
-) -> None:
+def measure(runs: Sequence[Run], judge: Judge, repeats: int, progress: Progress | None) -> None:
     """Warm up, run in turn, and judge."""
     judge.check(runs)
     done, total = 0, repeats * sum(run.plan.frames for run in runs)
@@ -158,6 +157,10 @@ def measure(
     for run in runs:
         run.sim.close()
     judge.judge(runs)
+
+
+def mark(runs: Sequence[Run], bound: float) -> None:
+    """Have runs count as diverged whose error is not finite or beyond the bound."""
     for run in runs:
         if not run.cause and not run.error <= bound:
             which = "be finite" if not math.isfinite(run.error) else f"be at most {bound:g}"
