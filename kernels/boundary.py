@@ -156,14 +156,16 @@ def box_kernels(
     place, ease = place_function(precision, compensated), ease_function(precision)
     friction, rebound = friction_function(precision), bounce_function(precision)
 
-    def outside(x: real, e: real, lower: real, upper: real, reach: real):
-        """Way back into [lower + reach, upper - reach]; infinite sides are open."""
-        low = (lower + reach - x) - e
-        high = (upper - reach - x) - e
-        back = wp.max(low, real(0.0)) + wp.min(high, real(0.0))
-        if low > high:
-            back = real(0.5) * (low + high)
-        return back
+    def outside(x: real, e: real, lower: real, upper: real, radius: real, slack: real):
+        """Way back between the sides that are closed; infinite ones are open."""
+        first = lower + radius
+        last = upper - radius
+        if first > last:
+            first = real(0.5) * (lower + upper)
+            last = first
+        low = (first - slack - x) - e
+        high = (last + slack - x) - e
+        return wp.max(low, real(0.0)) + wp.min(high, real(0.0))
 
     way_back = function(outside)
 
@@ -189,9 +191,8 @@ def box_kernels(
             s = slack[a]
             if marked[world[k]] != 0:
                 # Where the substep began: the way since is no overlap.
-                s = wp.abs(
-                    way_back(b.x[i][a] - dt * b.v[i][a], real(0.0), p.lower[a], p.upper[a], R)
-                )
+                start = b.x[i][a] - dt * b.v[i][a]
+                s = wp.abs(way_back(start, real(0.0), p.lower[a], p.upper[a], R, real(0.0)))
             if s > real(0.0):
                 s = ease(s, R, dt, easing)
             slack[a] = s
@@ -218,13 +219,15 @@ def box_kernels(
             e = b.x_error[i]
         back = vec3()
         for a in range(3):
-            reach = radius[i] - moving * slack[k][a]
-            back[a] = way_back(x[a], e[a], p.lower[a], p.upper[a], reach)
+            s = moving * slack[k][a]
+            back[a] = way_back(x[a], e[a], p.lower[a], p.upper[a], radius[i], s)
         if wp.dot(back, back) > real(0.0) and b.w[i] > real(0.0):
             dx = back
             if p.friction > real(0.0):
-                # With the normal corrections: a way into one side is no slip along another.
-                u = b.v[i] * dt + b.correction[i] * moving + back
+                u = b.v[i] * dt + b.correction[i] * moving
+                for a in range(3):
+                    if back[a] != real(0.0):  # a way into one side is no slip along another
+                        u[a] = real(0.0)
                 for a in range(3):
                     n = vec3()
                     n[a] = real(1.0)
@@ -260,8 +263,7 @@ def box_kernels(
             if wp.static(forces):
                 before = before - f[i] * (b.w[i] * dt)
             for a in range(3):
-                reach = radius[i] - slack[k][a]
-                back = way_back(x[a] - c[a], e[a], p.lower[a], p.upper[a], reach)
+                back = way_back(x[a] - c[a], e[a], p.lower[a], p.upper[a], radius[i], slack[k][a])
                 inward = wp.where(back > real(0.0), real(1.0), real(-1.0))
                 if back != real(0.0):
                     dv = rebound(before[a] * inward, v[a] * inward, p.restitution)

@@ -122,7 +122,7 @@ def text(table: Tradeoff) -> str:
         mark = "diverged" if row.diverged else "*" if id(row) in front else ""
         grid.add_row(
             *(_shown(row.values[name]) for name in table.vary),
-            _shown(row.error), _shown(row.cost), f"{100 * row.spread:.0f} %",
+            _shown(row.error), _shown(row.cost), _percent(row),
             amount(row.rate), f"{amount(row.array_bytes, 1024)}B", mark,
         )  # fmt: skip
     stream = io.StringIO()
@@ -148,6 +148,10 @@ def _notes(table: Tradeoff) -> list[str]:
     return notes + [f"diverged, {row.label()}: {row.cause}" for row in table.diverged]
 
 
+def _percent(row: Row) -> str:
+    return f"{100 * row.spread:.0f} %" if len(row.costs) > 1 else "-"
+
+
 def _shown(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.3g}" if math.isfinite(value) else "-"
@@ -159,7 +163,7 @@ def amount(value: float, step: int = 1000) -> str:
     if not math.isfinite(value):
         return "-"
     for prefix in ("", "k", "M", "G"):
-        if abs(value) < step or prefix == "G":
+        if abs(value) < 999.5 or prefix == "G":
             break
         value /= step
     binary = "i" if prefix and step == 1024 else ""

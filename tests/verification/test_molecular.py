@@ -92,14 +92,14 @@ def test_what_a_cutoff_leaves_out(device):
 # Dynamics ---------------------------------------------------------------------------------------
 
 
-def liquid(cells, density, temperature, truncation, seed=0):
+def liquid(cells, density, temperature, truncation, cutoff=2.5, seed=0):
     count = 4 * cells**3
     side = (count / density) ** (1 / 3)
     scene = ps.Scene(periodic=((0, 0, 0), (side,) * 3))
     # Half of the heat goes into the melting of the lattice.
     v = ps.sample.maxwell_boltzmann(count, 2 * temperature, 1.0, seed=seed)
     scene.add_particles(ps.sample.lattice("fcc", (cells,) * 3, side / cells), velocity=v)
-    scene.add_interaction(ps.LennardJones(cutoff=2.5, truncation=truncation))
+    scene.add_interaction(ps.LennardJones(cutoff=cutoff, truncation=truncation))
     return scene
 
 
@@ -127,11 +127,10 @@ def energies(scene, start, dt, span, sample):
     return np.array(found)
 
 
-def melted(truncation, device, frames=60):
-    scene = liquid(4, 0.75, 1.0, truncation)
-    settings = ps.Settings(
-        dt=0.05, substeps=10, integrator="velocity_verlet", precision="float64"
-    )
+def melted(truncation, device, frames=60, cutoff=2.5):
+    """A liquid of 256 atoms at rho 0.75, T 1: its scene, and a simulation of it."""
+    scene = liquid(4, 0.75, 1.0, truncation, cutoff)
+    settings = ps.Settings(dt=0.05, substeps=10, integrator="velocity_verlet", precision="float64")
     start = ps.Simulation(scene, settings, device=device)
     equilibrate(start, 1.0, frames)
     return scene, start
@@ -152,14 +151,15 @@ def test_energy_fluctuates_with_the_square_of_the_step(device):
 
 @pytest.mark.slow
 def test_energy_fluctuation_over_160_time_units(device):
-    # N 256, rho 0.75, T 1. The spread is known to its digits for another trajectory: 800
-    # independent values make 4 %, a temperature off by 2 % as much, and at the shortest steps
-    # the jump of the force at the cutoff adds a random walk of its own.
-    scene, start = melted("shift", device, frames=200)
-    known = {0.016: 2.0e-3, 0.008: 4.3e-4, 0.004: 1.17e-4, 0.002: 3.7e-5, 0.001: 1.1e-5}
+    # N 256, rho 0.75, T 1. A step of 0.016, near the limit of stability, heats the liquid and is
+    # left out. Another trajectory: 800 independent values are right to 4 %, the temperature to
+    # 3 %, of whose square root and more the spread goes; the force jumps at the cutoff (taken as
+    # far as the box allows), a random walk that shows at the shortest steps.
+    scene, start = melted("shift", device, frames=200, cutoff=3.4)
+    known = {0.008: 4.3e-4, 0.004: 1.17e-4, 0.002: 3.7e-5, 0.001: 1.1e-5}
     for dt, expected in known.items():
         spread = energies(scene, start, dt, span=160, sample=0.064).std()
-        assert spread == pytest.approx(expected, rel=0.15 if dt > 0.003 else 0.6), dt
+        assert spread == pytest.approx(expected, rel=0.15 if dt > 0.003 else 0.4), dt
 
 
 @pytest.mark.slow
