@@ -7,27 +7,46 @@ import warp as wp
 
 from .constraints import bodies_type, place_function
 from .easing import ease_function, easing_type
-from .precision import Precision, function, register
+from .precision import Precision, function, register, structure
+
+
+@functools.cache
+def held_type(precision: Precision, each: Any) -> Any:
+    """The particles that a boundary holds, with one ``each`` of slack and of grip.
+
+    Grip is how far friction may still take particles back in this substep: mu times the normal
+    corrections less what it has taken. It outlives an iteration, so that a side that one iteration
+    pressed on holds against what the next one does along it.
+    """
+    fields = {
+        "particle": wp.array(dtype=wp.int32),
+        "world": wp.array(dtype=wp.int32),
+        "radius": wp.array(dtype=precision.scalar),  # by particle
+        "slack": wp.array(dtype=each),
+        "marked": wp.array(dtype=wp.int32),  # worlds whose slack is to be measured
+        "grip": wp.array(dtype=each),  # empty where nothing rubs
+    }
+    return structure(f"Held_{precision.name}_{each.__name__}", fields)
 
 
 @functools.cache
 def friction_function(precision: Precision) -> wp.Function:
-    """``grip(u, n, d, mu)``: what friction takes back of the way u, at a normal correction d > 0.
+    """``rub(u, n, grip)``: what friction takes back of the way u along a side of normal n.
 
-    All of the tangential way if it is no more than mu d, else mu d of it (Macklin et al. 2014,
-    eq. 24, with one coefficient).
+    All of the tangential way, or as much as there is grip for (Macklin et al. 2014, eq. 24, with
+    one coefficient).
     """
     vec3, real = precision.vec3, precision.scalar
 
-    def grip(u: vec3, n: vec3, d: real, mu: real):
+    def rub(u: vec3, n: vec3, grip: real):
         t = u - n * wp.dot(u, n)
         length = wp.length(t)
         factor = real(1.0)
-        if length > mu * d:
-            factor = mu * d / length
+        if length > grip:
+            factor = grip / length
         return t * factor
 
-    return function(grip)
+    return function(rub)
 
 
 @functools.cache
@@ -49,9 +68,13 @@ def bounce_function(precision: Precision) -> wp.Function:
 def plane_kernels(
     precision: Precision, params: Any, compensated: bool, forces: bool
 ) -> tuple[wp.Kernel, wp.Kernel, wp.Kernel]:
-    """Kernels of a half space (x - point) . n >= R: slack, projection, bounce."""
+    """Kernels of a half space (x - point) . n >= R: start of a substep, projection, bounce."""
     vec3, real = precision.vec3, precision.scalar
-    Bodies, Easing = bodies_type(precision), easing_type(precision)
+    Bodies, Easing, Held = (
+        bodies_type(precision),
+        easing_type(precision),
+        held_type(precision, real),
+    )
     place, ease = place_function(precision, compensated), ease_function(precision)
     friction, rebound = friction_function(precision), bounce_function(precision)
 
@@ -64,51 +87,40 @@ def plane_kernels(
     above = function(height)
 
     @register
-    def ease_plane(
-        first: int,
-        members: wp.array(dtype=wp.int32),
-        world: wp.array(dtype=wp.int32),
-        parameters: wp.array(dtype=params),
-        marked: wp.array(dtype=wp.int32),
-        radius: wp.array(dtype=real),
-        b: Bodies,
-        easing: Easing,
-        dt: real,
-        slack_io: wp.array(dtype=real),
+    def begin_plane(
+        first: int, parameters: wp.array(dtype=params), h: Held, b: Bodies, easing: Easing, dt: real
     ):
         k = first + wp.tid()
-        i = members[k]
-        w = world[k]
-        s = slack_io[k]
-        if marked[w] != 0:
+        i = h.particle[k]
+        p = parameters[h.world[k]]
+        R = h.radius[i]
+        s = h.slack[k]
+        if h.marked[h.world[k]] != 0:
             # Where the substep began: the way since is no overlap.
-            start = above(i, parameters[w], b) - dt * wp.dot(b.v[i], parameters[w].normal)
-            s = wp.max(radius[i] - start, real(0.0))
+            s = wp.max(R - (above(i, p, b) - dt * wp.dot(b.v[i], p.normal)), real(0.0))
         if s > real(0.0):
-            s = ease(s, radius[i], dt, easing)
-        slack_io[k] = s
+            s = ease(s, R, dt, easing)
+        h.slack[k] = s
+        if p.friction > real(0.0):
+            h.grip[k] = real(0.0)
 
     @register
     def project_plane(
-        first: int,
-        members: wp.array(dtype=wp.int32),
-        world: wp.array(dtype=wp.int32),
-        parameters: wp.array(dtype=params),
-        slack: wp.array(dtype=real),
-        radius: wp.array(dtype=real),
-        b: Bodies,
-        moving: real,
-        dt: real,
+        first: int, parameters: wp.array(dtype=params), h: Held, b: Bodies, moving: real, dt: real
     ):
         k = first + wp.tid()
-        i = members[k]
-        p = parameters[world[k]]
-        d = radius[i] - moving * slack[k] - above(i, p, b)
-        if d > real(0.0) and b.w[i] > real(0.0):
-            dx = p.normal * d
-            if p.friction > real(0.0):
-                u = b.v[i] * dt + b.correction[i] * moving
-                dx = dx - friction(u, p.normal, d, p.friction)
+        i = h.particle[k]
+        p = parameters[h.world[k]]
+        d = wp.max(h.radius[i] - moving * h.slack[k] - above(i, p, b), real(0.0))
+        dx = p.normal * d
+        rubs = moving * p.friction > real(0.0)
+        if rubs:
+            grip = h.grip[k] + p.friction * d
+            rubs = grip > real(0.0)
+            taken = friction(b.v[i] * dt + b.correction[i], p.normal, grip)
+            h.grip[k] = grip - wp.length(taken)
+            dx = dx - taken
+        if (d > real(0.0) or rubs) and b.w[i] > real(0.0):
             e = vec3()
             if wp.static(compensated):
                 e = b.x_error[i]
@@ -117,22 +129,19 @@ def plane_kernels(
     @register
     def bounce_plane(
         first: int,
-        members: wp.array(dtype=wp.int32),
-        world: wp.array(dtype=wp.int32),
         parameters: wp.array(dtype=params),
-        slack: wp.array(dtype=real),
-        radius: wp.array(dtype=real),
+        h: Held,
         b: Bodies,
         f: wp.array(dtype=vec3),
         dt: real,
         inverse_dt: real,
     ):
         k = first + wp.tid()
-        i = members[k]
-        p = parameters[world[k]]
+        i = h.particle[k]
+        p = parameters[h.world[k]]
         c = b.correction[i]
-        integrated = above(i, p, b) - wp.dot(c, p.normal)
-        if p.restitution > real(0.0) and integrated < radius[i] - slack[k] and b.w[i] > real(0.0):
+        d = h.radius[i] - h.slack[k] - (above(i, p, b) - wp.dot(c, p.normal))
+        if p.restitution > real(0.0) and d > real(0.0) and b.w[i] > real(0.0):
             v = b.v[i]
             before = v - c * inverse_dt
             if wp.static(forces):
@@ -140,19 +149,23 @@ def plane_kernels(
             dv = rebound(wp.dot(before, p.normal), wp.dot(v, p.normal), p.restitution)
             b.v[i] = v + p.normal * dv
 
-    return ease_plane, project_plane, bounce_plane
+    return begin_plane, project_plane, bounce_plane
 
 
 @functools.cache
 def box_kernels(
     precision: Precision, params: Any, compensated: bool, forces: bool
 ) -> tuple[wp.Kernel, wp.Kernel, wp.Kernel]:
-    """Kernels of the inside of a box, lower + R <= x <= upper - R: slack, projection, bounce.
+    """Kernels of the inside of a box, lower + R <= x <= upper - R: as for a plane.
 
-    Slack is by axis. Where the box is too narrow for a particle, the middle is right.
+    Slack and grip are by axis. Where the box is too narrow for a particle, the middle is right.
     """
     vec3, real = precision.vec3, precision.scalar
-    Bodies, Easing = bodies_type(precision), easing_type(precision)
+    Bodies, Easing, Held = (
+        bodies_type(precision),
+        easing_type(precision),
+        held_type(precision, vec3),
+    )
     place, ease = place_function(precision, compensated), ease_function(precision)
     friction, rebound = friction_function(precision), bounce_function(precision)
 
@@ -169,89 +182,83 @@ def box_kernels(
 
     way_back = function(outside)
 
+    def along_sides(k: int, i: int, back: vec3, mu: real, h: Held, b: Bodies, dt: real):
+        """What friction takes on all sides."""
+        u = b.v[i] * dt + b.correction[i]
+        grip = h.grip[k]
+        for a in range(3):
+            if back[a] != real(0.0):  # a way into one side is no slip along another
+                u[a] = real(0.0)
+        total = vec3()
+        for a in range(3):
+            n = vec3()
+            n[a] = real(1.0)
+            limit = grip[a] + mu * wp.abs(back[a])
+            taken = friction(u, n, limit)
+            grip[a] = limit - wp.length(taken)
+            total = total + taken
+            u = u - taken
+        h.grip[k] = grip
+        return total
+
+    rub = function(along_sides)
+
     @register
-    def ease_box(
-        first: int,
-        members: wp.array(dtype=wp.int32),
-        world: wp.array(dtype=wp.int32),
-        parameters: wp.array(dtype=params),
-        marked: wp.array(dtype=wp.int32),
-        radius: wp.array(dtype=real),
-        b: Bodies,
-        easing: Easing,
-        dt: real,
-        slack_io: wp.array(dtype=vec3),
+    def begin_box(
+        first: int, parameters: wp.array(dtype=params), h: Held, b: Bodies, easing: Easing, dt: real
     ):
         k = first + wp.tid()
-        i = members[k]
-        p = parameters[world[k]]
-        R = radius[i]
-        slack = slack_io[k]
+        i = h.particle[k]
+        p = parameters[h.world[k]]
+        R = h.radius[i]
+        slack = h.slack[k]
         for a in range(3):
             s = slack[a]
-            if marked[world[k]] != 0:
+            if h.marked[h.world[k]] != 0:
                 # Where the substep began: the way since is no overlap.
                 start = b.x[i][a] - dt * b.v[i][a]
                 s = wp.abs(way_back(start, real(0.0), p.lower[a], p.upper[a], R, real(0.0)))
             if s > real(0.0):
                 s = ease(s, R, dt, easing)
             slack[a] = s
-        slack_io[k] = slack
+        h.slack[k] = slack
+        if p.friction > real(0.0):
+            h.grip[k] = vec3()
 
     @register
     def project_box(
-        first: int,
-        members: wp.array(dtype=wp.int32),
-        world: wp.array(dtype=wp.int32),
-        parameters: wp.array(dtype=params),
-        slack: wp.array(dtype=vec3),
-        radius: wp.array(dtype=real),
-        b: Bodies,
-        moving: real,
-        dt: real,
+        first: int, parameters: wp.array(dtype=params), h: Held, b: Bodies, moving: real, dt: real
     ):
         k = first + wp.tid()
-        i = members[k]
-        p = parameters[world[k]]
+        i = h.particle[k]
+        p = parameters[h.world[k]]
         x = b.x[i]
         e = vec3()
         if wp.static(compensated):
             e = b.x_error[i]
-        back = vec3()
+        dx = vec3()
         for a in range(3):
-            s = moving * slack[k][a]
-            back[a] = way_back(x[a], e[a], p.lower[a], p.upper[a], radius[i], s)
-        if wp.dot(back, back) > real(0.0) and b.w[i] > real(0.0):
-            dx = back
-            if p.friction > real(0.0):
-                u = b.v[i] * dt + b.correction[i] * moving
-                for a in range(3):
-                    if back[a] != real(0.0):  # a way into one side is no slip along another
-                        u[a] = real(0.0)
-                for a in range(3):
-                    n = vec3()
-                    n[a] = real(1.0)
-                    taken = friction(u, n, wp.abs(back[a]), p.friction)
-                    dx = dx - taken
-                    u = u - taken
+            slack = moving * h.slack[k][a]
+            dx[a] = way_back(x[a], e[a], p.lower[a], p.upper[a], h.radius[i], slack)
+        if moving * p.friction > real(0.0):
+            dx = dx - rub(k, i, dx, p.friction, h, b, dt)
+        touched = dx[0] != real(0.0) or dx[1] != real(0.0) or dx[2] != real(0.0)
+        if touched and b.w[i] > real(0.0):
             place(i, x, e, dx, b)
 
     @register
     def bounce_box(
         first: int,
-        members: wp.array(dtype=wp.int32),
-        world: wp.array(dtype=wp.int32),
         parameters: wp.array(dtype=params),
-        slack: wp.array(dtype=vec3),
-        radius: wp.array(dtype=real),
+        h: Held,
         b: Bodies,
         f: wp.array(dtype=vec3),
         dt: real,
         inverse_dt: real,
     ):
         k = first + wp.tid()
-        i = members[k]
-        p = parameters[world[k]]
+        i = h.particle[k]
+        p = parameters[h.world[k]]
         if p.restitution > real(0.0) and b.w[i] > real(0.0):
             c = b.correction[i]
             x = b.x[i]
@@ -263,11 +270,12 @@ def box_kernels(
             if wp.static(forces):
                 before = before - f[i] * (b.w[i] * dt)
             for a in range(3):
-                back = way_back(x[a] - c[a], e[a], p.lower[a], p.upper[a], radius[i], slack[k][a])
+                slack = h.slack[k][a]
+                back = way_back(x[a] - c[a], e[a], p.lower[a], p.upper[a], h.radius[i], slack)
                 inward = wp.where(back > real(0.0), real(1.0), real(-1.0))
                 if back != real(0.0):
                     dv = rebound(before[a] * inward, v[a] * inward, p.restitution)
                     v[a] = v[a] + inward * dv
             b.v[i] = v
 
-    return ease_box, project_box, bounce_box
+    return begin_box, project_box, bounce_box

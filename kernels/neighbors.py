@@ -247,7 +247,7 @@ def grid_rows_kernel(precision: Precision, periodic: Periodicity, vectorised: bo
 
     look = function(query)
 
-    @functools.partial(register, vectorised=vectorised)
+    @functools.partial(register, cpu_only=vectorised)
     def grid_rows(
         first: int,
         grid: wp.uint64,
@@ -295,7 +295,7 @@ def direct_rows_kernel(precision: Precision, periodic: Periodicity, vectorised: 
 
     every = function(look)
 
-    @functools.partial(register, vectorised=vectorised)
+    @functools.partial(register, cpu_only=vectorised)
     def direct_rows(
         first: int,
         direct: wp.array(dtype=wp.int32),

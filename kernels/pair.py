@@ -120,7 +120,7 @@ _KERNELS: dict[tuple, wp.Kernel] = {}
 def _pair_kernel(loop, term, store, data, params, out, precision, vectorised) -> wp.Kernel:
     Box, real, vec3 = box_type(precision), precision.scalar, precision.vec3
 
-    @functools.partial(register, vectorised=vectorised)
+    @functools.partial(register, cpu_only=vectorised)
     def sum_over_partners(
         first: int,
         pairs: Pairs,

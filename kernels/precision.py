@@ -73,17 +73,21 @@ class _Rewriter(ast.NodeTransformer):
         return _name("_float64", node) if self.double and node.id == "float" else node
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
-        if not isinstance(node.value, ast.Name):
-            return self.generic_visit(node)
-        owner = self.scope.get(node.value.id)
+        owner = self._meaning(node.value)
         value = getattr(owner, node.attr, None)
-        if isinstance(value, float):
+        if isinstance(value, float | int):
             # Infinities and NaN have no literal, and are the same in both precisions.
             known = ast.copy_location(ast.Constant(value), node) if math.isfinite(value) else node
-            return self._number(known)
+            return self._number(known) if isinstance(value, float) else known
         if self.double and owner is wp and node.attr in _DOUBLE:
             return _name(f"_{node.attr}_double", node)
-        return node
+        return node if owner is not None else self.generic_visit(node)
+
+    def _meaning(self, node: ast.AST) -> Any:
+        """What a dotted name stands for outside the law, or None."""
+        if isinstance(node, ast.Attribute):
+            return getattr(self._meaning(node.value), node.attr, None)
+        return self.scope.get(node.id) if isinstance(node, ast.Name) else None
 
     def visit_arguments(self, node: ast.arguments) -> ast.AST:
         return node  # annotations are mapped by value, see `annotation`
@@ -146,16 +150,35 @@ def translate(
         name: annotation(parameter.annotation, precision)
         for name, parameter in inspect.signature(func, eval_str=True).parameters.items()
     }
-    digest = _digest(source, precision.name, *used.values())
-    return wp.Function(
+    digest = _digest(source, precision.name, *hints.values(), *used.values())
+    return _made_once(
         copy,
-        key=func.__name__,
-        namespace="",
+        f"law_{func.__name__}_{digest}",
         module=wp.get_module(func.__module__),
-        native_func=f"law_{func.__name__}_{digest}",
         overloaded_annotations=hints,
         source=source,
     )
+
+
+_FUNCTIONS: dict[tuple[Any, ...], wp.Function] = {}
+
+
+def _made_once(
+    func: Callable[..., Any], native_func: str, after_gradients: bool = False, **options: Any
+) -> wp.Function:
+    """The Warp function of that native name, the same one for the same name.
+
+    A kernel that calls what is one function by content gets its definition once, also where two
+    users made it, each for themselves.
+    """
+    key = (native_func, func.__module__, after_gradients)
+    if key not in _FUNCTIONS:
+        made = wp.Function(
+            func, key=func.__name__, namespace="", native_func=native_func, **options
+        )
+        made.adj.uses_grad_call = after_gradients
+        _FUNCTIONS[key] = made
+    return _FUNCTIONS[key]
 
 
 def _rewritten(func: Callable[..., Any], precision: Precision, scope: dict[str, Any]) -> str:
@@ -177,6 +200,10 @@ def _digest(*parts: Any) -> str:
             return value.key + value.hash.hex()
         if isinstance(value, wp.array):
             return f"array{value.ndim} of {text(value.dtype)}"
+        if hasattr(value, "_wp_scalar_type_") and isinstance(value, type):
+            # Vector types of any length and precision share one Python name.
+            kind = (value._wp_generic_type_str_, value._wp_scalar_type_, value._shape_)
+            return f"{kind[0]} of {kind[1].__name__} {kind[2]}"
         return str(getattr(value, "__qualname__", value))
 
     return hashlib.sha256("|".join(map(text, parts)).encode()).hexdigest()[:12]
@@ -194,15 +221,12 @@ def function(func: Callable[..., Any], after_gradients: bool = False) -> wp.Func
     """
     cells = [c.cell_contents for c in func.__closure__ or ()]
     digest = _digest(inspect.getsource(func), *cells, *func.__annotations__.values())
-    result = wp.Function(
+    return _made_once(
         func,
-        key=func.__name__,
-        namespace="",
+        f"{func.__name__}_{digest}",
+        after_gradients,
         module=wp.get_module(func.__module__),
-        native_func=f"{func.__name__}_{digest}",
     )
-    result.adj.uses_grad_call = after_gradients
-    return result
 
 
 def native(stub: Callable[..., Any], snippet: str, after_gradients: bool = True) -> wp.Function:
@@ -212,18 +236,15 @@ def native(stub: Callable[..., Any], snippet: str, after_gradients: bool = True)
     the adjoints that those call, so that the snippet may call a derived law by name.
     """
     digest = _digest(snippet, *stub.__annotations__.values())
-    result = wp.Function(
+    return _made_once(
         stub,
-        key=stub.__name__,
-        namespace="",
+        f"{stub.__name__}_{digest}",
+        after_gradients,
         module=wp.get_module(stub.__module__),
         native_snippet=snippet,
-        native_func=f"{stub.__name__}_{digest}",
         # Warp honours the return type only where it reads its own decorator in the source.
         source="@wp.func_native()\n" + textwrap.dedent(inspect.getsource(stub)),
     )
-    result.adj.uses_grad_call = after_gradients
-    return result
 
 
 KERNELS: list[wp.Kernel] = []  # every kernel built in this process that CUDA can run
@@ -231,13 +252,13 @@ KERNELS: list[wp.Kernel] = []  # every kernel built in this process that CUDA ca
 kernel = functools.partial(wp.kernel, enable_backward=False, module="unique")
 
 
-def register(func: Callable[..., Any], vectorised: bool = False) -> wp.Kernel:
+def register(func: Callable[..., Any], cpu_only: bool = False) -> wp.Kernel:
     """Make a kernel without a backward pass, in a module of its own, and remember it.
 
-    ``vectorised`` ones hold C++ that only the CPU's compiler takes; CUDA runs their plain twins.
+    ``cpu_only`` ones hold C++ for the CPU's vector units or threads; CUDA never runs them.
     """
     made = kernel(func)
-    if not vectorised:
+    if not cpu_only:
         KERNELS.append(made)
     return made
 
@@ -256,10 +277,4 @@ def function_from_source(source: str, namespace: dict[str, Any]) -> wp.Function:
     exec(compile(source, filename, "exec"), scope)
     # Warp reads the source back through inspect, which asks linecache.
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
-    return wp.Function(
-        scope[name],
-        key=name,
-        namespace="",
-        module=wp.get_module(__name__),
-        native_func=f"{name}_{digest}",
-    )
+    return _made_once(scope[name], f"{name}_{digest}", module=wp.get_module(__name__))

@@ -13,10 +13,10 @@ import warp as wp
 
 from .launch import CHUNK, Call, Frame, Launch, Program
 from .settings import Settings
-from .threads import Team
+from .threads import Shared, Team
 
 LARGEST_GRAPH = 4096  # operations
-WORTH_SHARING = 2e-4  # seconds of a launch; handing it round takes about 5e-5
+WORTH_SHARING = 5e-5  # seconds of a launch; handing it round takes a fifth of that
 CHUNKS_PER_THREAD = 4  # so that a thread that is held up does not hold up the others
 
 
@@ -87,6 +87,7 @@ class ThreadExecutor:
         self.frame = frame
         self._flags: dict[int, np.ndarray] = {}
         self._whole: dict[int, Any] = {}
+        self._chunks: dict[int, Shared] = {}
         self._shared: dict[int, bool] = {}  # whether a launch is worth sharing, once timed
         for part in frame.parts:
             for operation in part.launches():
@@ -94,6 +95,8 @@ class ThreadExecutor:
                 self._whole[id(operation)] = operation.commands[0]
                 if threads > 1:
                     operation.record(threads * CHUNKS_PER_THREAD)
+                    if len(operation.commands) > 1:
+                        self._chunks[id(operation)] = Shared(operation.commands)
         self.team = Team(threads) if threads > 1 else None
 
     def run(self) -> None:
@@ -118,17 +121,14 @@ class ThreadExecutor:
         return self._flags[flag.ptr]
 
     def _launch(self, operation: Launch) -> None:
-        if self.team is None or len(operation.commands) == 1:
-            self._whole[id(operation)].launch()
-            return
-        shared = self._shared.get(id(operation))
-        if shared:
-            self.team.run(operation.commands)
+        key = id(operation)
+        if self.team is not None and self._shared.get(key):
+            self.team.run(self._chunks[key])
             return
         start = time.perf_counter()
-        self._whole[id(operation)].launch()
-        if shared is None:
-            self._shared[id(operation)] = time.perf_counter() - start > WORTH_SHARING
+        self._whole[key].launch()
+        if key in self._chunks and key not in self._shared:
+            self._shared[key] = time.perf_counter() - start > WORTH_SHARING
 
     def close(self) -> None:
         """End the worker threads."""

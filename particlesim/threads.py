@@ -1,22 +1,39 @@
-"""A team of threads that share recorded launches.
+"""A team of threads that share recorded launches (see :mod:`particlesim.kernels.team`).
 
 Between two shared launches lie tens of microseconds, and waking a thread that sleeps takes
-hundreds. So a thread that has run out of work looks for more in native code for about a
-millisecond, without Python's lock, before it goes to sleep.
+hundreds. So a worker looks for the next launch in native code for about a millisecond before it
+goes to sleep.
 """
 
 from __future__ import annotations
 
+import ctypes
 import threading
+import time
+from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import warp as wp
 
-from .kernels.wait import wait_kernel
+from .kernels.team import DONE, LEAVE, POSTS, RING, STATE, serve_kernel, share_kernel
 
-# A worker looks for work for about a millisecond. Who waits for the workers sleeps much sooner: on
-# a machine with other work to do, it may be in the way of the very one that it waits for.
-LOOKS_FOR_WORK, LOOKS_FOR_WORKERS = 1_000_000, 50_000
+# A worker looks for work for about a millisecond. The caller, who waits for the workers, looks for
+# a shorter while and then lets others run: one of them may be the worker that it waits for.
+WORKER_LOOKS, CALLER_LOOKS = 1_000_000, 100_000
+
+
+class Shared:
+    """Commands packed for native code: entry point, bounds and arguments of each.
+
+    Args:
+        commands: ``wp.Launch`` commands on the CPU.
+    """
+
+    def __init__(self, commands: Sequence[Any]):
+        self._kept = [_packed(command) for command in commands]  # what the table points to
+        self.table = np.array([addresses for addresses, _ in self._kept], dtype=np.uint64)
+        self.count = len(self.table)
 
 
 class Team:
@@ -27,113 +44,88 @@ class Team:
     """
 
     def __init__(self, threads: int):
-        self._board = _Board(threads - 1)
+        self._board = _Board()
+        self._share = self._board.command(share_kernel(), CALLER_LOOKS)
         # The workers know the board only, so that the team can be let go.
         self.workers = [
-            threading.Thread(target=_work, args=(self._board, index), daemon=True)
-            for index in range(threads - 1)
+            threading.Thread(target=_work, args=(self._board,), daemon=True)
+            for _ in range(threads - 1)
         ]
         for worker in self.workers:
             worker.start()
 
-    def run(self, commands: list[Any]) -> None:
-        """Launch all commands, each by whoever is free, and return when all are done."""
+    def run(self, shared: Shared) -> None:
+        """Run all commands, each by whoever is free, and return when all are done."""
         board = self._board
-        board.todo = list(commands)
-        board.post()
-        failure = _drain(board.todo)
-        board.wait_for_all()
-        failure = board.failure or failure
-        if failure is not None:
-            board.failure = None
-            raise failure
+        board.post(shared)
+        self._share.launch()
+        while board.words[DONE] < shared.count:
+            time.sleep(0)
+            self._share.launch()
 
     def close(self) -> None:
         """Send the workers home."""
-        self._board.closed = True
-        self._board.post()
+        self._board.close()
 
     def __del__(self) -> None:
         self.close()
 
 
-class _Waiter:
-    """Waits for a counter in memory to change, in native code."""
-
-    def __init__(self, counter: wp.array, looks: int):
-        self.counter, self.view = counter, counter.numpy()
-        self.command = wp.launch(
-            wait_kernel(), 1, [0, counter, 0, looks], device="cpu", record_cmd=True
-        )
-
-    def wait(self, value: int) -> bool:
-        """Look until the counter is no longer ``value``; False if it still is."""
-        self.command.set_param_at_index(2, value)
-        self.command.launch()
-        return bool(self.view[0] != value)
-
-
 class _Board:
-    """What a team shares: the commands, how often some were posted, and who has finished."""
+    """The shared memory, and where workers sleep."""
 
-    def __init__(self, workers: int):
-        self.todo: list[Any] = []
-        self.failure: Exception | None = None
-        self.closed = False
-        self.posted = wp.zeros(1, dtype=wp.int32, device="cpu")
-        self.posts = self.posted.numpy()
-        self.done = [wp.zeros(1, dtype=wp.int32, device="cpu") for _ in range(workers)]
-        self.counts = [each.numpy() for each in self.done]
-        self.waiters = [_Waiter(each, LOOKS_FOR_WORKERS) for each in self.done]
+    def __init__(self) -> None:
+        self.memory = wp.zeros(POSTS + 2 * RING, dtype=wp.uint64, device="cpu")
+        self.words = self.memory.numpy()
+        self.posts = 0
+        self.asleep = 0
         self.awake = threading.Condition()
-        self.caller_sleeps = False
 
-    def post(self) -> None:
-        """Tell everybody, those asleep too."""
-        with self.awake:
-            self.posts[0] += 1
-            self.awake.notify_all()
+    def command(self, kernel: Any, looks: int) -> Any:
+        """A recorded launch of one of the team's kernels."""
+        return wp.launch(kernel, 1, [0, self.memory, looks], device="cpu", record_cmd=True)
 
-    def wait_for_all(self) -> None:
-        """Until each worker has finished with the latest post."""
-        latest = int(self.posts[0])
-        for waiter in self.waiters:
-            if waiter.view[0] == latest or waiter.wait(int(waiter.view[0])):
-                continue
-            with self.awake:
-                self.caller_sleeps = True
-                while waiter.view[0] != latest:
-                    self.awake.wait()
-                self.caller_sleeps = False
-
-    def finish(self, index: int, post: int) -> None:
-        """A worker has nothing left to do of a post."""
-        self.counts[index][0] = post
-        if self.caller_sleeps:
+    def post(self, shared: Shared) -> None:
+        """Offer the commands; nothing of an earlier post is still under way."""
+        self.posts += 1
+        at = POSTS + 2 * (self.posts % RING)
+        self.words[DONE] = 0
+        self.words[at] = shared.table.ctypes.data
+        self.words[at + 1] = shared.count
+        self.words[STATE] = (self.posts % 2**32) << 32
+        if self.asleep:
             with self.awake:
                 self.awake.notify_all()
 
-
-def _work(board: _Board, index: int) -> None:
-    waiter, seen = _Waiter(board.posted, LOOKS_FOR_WORK), 0
-    while True:
-        if not waiter.wait(seen):
-            with board.awake:
-                while board.posts[0] == seen:
-                    board.awake.wait()
-        seen = int(board.posts[0])
-        if board.closed:
-            return
-        board.failure = _drain(board.todo) or board.failure
-        board.finish(index, seen)
+    def close(self) -> None:
+        """Have everybody leave."""
+        self.words[LEAVE] = 1
+        with self.awake:
+            self.awake.notify_all()
 
 
-def _drain(todo: list[Any]) -> Exception | None:
-    """Run commands off the shared list until it is empty; list.pop is atomic."""
-    try:
-        while True:
-            todo.pop().launch()
-    except IndexError:
-        return None
-    except Exception as failure:
-        return failure
+def _work(board: _Board) -> None:
+    serve = board.command(serve_kernel(), WORKER_LOOKS)
+    while not board.words[LEAVE]:
+        serve.launch()
+        with board.awake:
+            seen = board.posts
+            board.asleep += 1
+            # What is posted from here on finds this worker counted as asleep, and wakes it.
+            if board.posts == seen and not board.words[LEAVE]:
+                board.awake.wait()
+            board.asleep -= 1
+
+
+def _packed(command: Any) -> tuple[tuple[int, int, int], Any]:
+    """Addresses of a command's entry point, bounds and arguments, and what must live as long.
+
+    A compiled CPU kernel is a function of two pointers: the bounds, and a struct of its arguments.
+    """
+    bounds, *values = command.params
+    names = [argument.label for argument in command.kernel.adj.args]
+    kinds = list(zip(names, map(type, values), strict=True))
+    arguments = type("Arguments", (ctypes.Structure,), {"_fields_": kinds})(*values)
+    entry = ctypes.cast(command.hooks.forward, ctypes.c_void_p).value or 0
+    addresses = (entry, ctypes.addressof(bounds), ctypes.addressof(arguments))
+    return addresses, (command, bounds, arguments)

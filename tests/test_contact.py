@@ -188,6 +188,25 @@ def test_column_stands_and_rests_on_its_overlaps(device):
     assert np.all(overlap >= 1.9 * carried * G * h**2)
 
 
+@pytest.mark.parametrize("iterations", [1, 4])
+def test_pyramid_stands(iterations, device):
+    """Thirty grains on a rough floor: friction alone holds the lowest layer together."""
+    radius, layers = 0.05, 4
+    x = []
+    for k in range(layers):
+        along = radius * (2 * np.arange(layers - k) - (layers - k - 1))
+        height = radius * (1 + np.sqrt(2) * k)
+        x += [(a, height, b) for a in along for b in along]
+    scene = grains(x, radius, gravity=True, contact={"friction": 0.5})
+    scene.add_constraint(ps.PlaneBoundary((0, 0, 0), (0, 1, 0), friction=0.5))
+    knobs = {"dt": 1 / 60, "substeps": 20, "iterations": iterations, "precision": "float32"}
+    sim = simulate(scene, device, **knobs)
+    sim.run(180)
+    # Overlaps of up to 2 split layers g h^2, split up to 4: 0.004 R.
+    assert np.allclose(sim.position, x, rtol=0, atol=5e-3 * radius)
+    assert np.abs(sim.velocity).max() < 1e-4
+
+
 @pytest.mark.parametrize("ratio", [1e4, 1e-4])
 def test_mass_ratio_in_a_stack(ratio, precision, device):
     """Ten thousandfold on top or below: bounded, in order, and at rest on top if light."""

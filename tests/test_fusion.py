@@ -90,3 +90,22 @@ def test_parameters_are_per_world(device):
     for w, strength in enumerate((1.0, 3.0)):
         alone, _ = forces(scene(strength), "float64", device)
         np.testing.assert_array_equal(batch.world(w).get("force"), alone)
+
+
+def test_one_law_twice(precision, device):
+    # The same laws with other parameters, given as laws or as plain functions.
+    def plain(r: float, strength: float):
+        return strength / r
+
+    def weak():
+        return ps.LennardJones(epsilon=0.1, cutoff=2.4)
+
+    def repelling():
+        return ps.PairPotential(plain, cutoff=2.3, strength=0.3)
+
+    makes = (lennard_jones, weak, repelling, repelling)
+    parts = [forces(liquid(make), precision, device)[0] for make in makes]
+    together, sim = forces(liquid(*makes), precision, device)
+    assert len(sim.passes) == 1
+    tolerance = 80 * 1e2 * np.finfo(together.dtype).eps  # as above
+    np.testing.assert_allclose(together, sum(parts), rtol=0, atol=tolerance)

@@ -1,5 +1,6 @@
 """Launching: graph, threads and plain launches agree bit for bit."""
 
+import time
 import weakref
 
 import numpy as np
@@ -10,6 +11,7 @@ import particlesim as ps
 from particlesim import launch
 from particlesim.executors import EagerExecutor, GraphExecutor, ThreadExecutor
 from particlesim.launch import CHUNK, Frame, Launch, Program, When
+from particlesim.threads import Shared, Team
 
 WAYS = [("graph", None), ("threads", 1), ("threads", 2), ("threads", 3), ("auto", 2)]
 
@@ -176,20 +178,22 @@ def test_a_condition_is_read_when_its_turn_comes():
     assert (values.numpy() == 1).all()
 
 
-def test_an_error_in_a_worker_is_raised():
-    class Failing:
-        def launch(self):
-            raise RuntimeError("no such thing")
-
-    values = wp.zeros(4 * CHUNK, dtype=float, device="cpu")
-    with launch.record(Program()) as program:
-        launch.launch(add_one, len(values), [values], values.device)
-    executor = ThreadExecutor(Frame(repeat=1, substep=program), 2)
-    executor._shared[id(program.operations[0])] = True  # as if it had taken long
-    program.operations[0].commands[0] = Failing()
-    with pytest.raises(RuntimeError, match="no such thing"):
-        executor.run()
-    executor.close()
+@pytest.mark.parametrize("threads", [2, 5])  # five: more than this machine may have cores
+def test_a_team_runs_every_chunk_once(threads):
+    values = wp.zeros(8 * CHUNK, dtype=float, device="cpu")
+    operation = Launch(add_one, len(values), [values], values.device)
+    operation.record(8)
+    shared, team = Shared(operation.commands), Team(threads)
+    assert shared.count == 8
+    for run in range(1, 301):
+        team.run(shared)
+        if run % 100 == 0:  # the workers fall asleep in between
+            time.sleep(0.02)
+            assert (values.numpy() == run).all()
+    team.close()
+    for worker in team.workers:
+        worker.join(5)
+        assert not worker.is_alive()
 
 
 def test_owners_are_remembered():

@@ -19,6 +19,10 @@ AXIS = wp.vec3(0.0, 0.5, 2.0)  # exact in float32, as a Warp vector of float32 m
 class Constants:
     scale = 0.3
 
+    class Deeper:
+        count = 2
+        factor = 0.1
+
 
 @ps.law
 def literals(position: wp.vec3):
@@ -47,7 +51,10 @@ def warp_helpers(position: wp.vec3):
 
 @ps.law
 def names(position: wp.vec3):
-    return RATE * position + math.pi * AXIS + wp.pi * Constants.scale * position
+    result = RATE * position + math.pi * AXIS + wp.pi * Constants.scale * position
+    for _ in range(Constants.Deeper.count):
+        result = result * Constants.Deeper.factor
+    return result
 
 
 def _closure(a, n):
@@ -107,7 +114,7 @@ def reference(name, x):
     if name == "warp_helpers":
         return x * first * 0.3 * 0.1 + x * second * 0.7 * 0.1
     if name == "names":
-        return 0.1 * x + math.pi * np.array([0, 0.5, 2.0]) + math.pi * 0.3 * x
+        return 0.01 * (0.1 * x + math.pi * np.array([0, 0.5, 2.0]) + math.pi * 0.3 * x)
     if name == "closure":
         return 0.7 * x * 0.1**2
     if name == "defaults":
@@ -210,6 +217,14 @@ def test_laws_of_the_same_code_are_the_same():
     assert _closure(0.7, 2).key == _closure(0.7, 2).key
     assert _closure(0.7, 2).key != _closure(0.8, 2).key
     assert _closure(0.7, 2).key != helper.key
+
+
+def test_what_a_name_stands_for_may_change(monkeypatch, device):
+    x = np.array([[0.5, 0.25, 0.75]])
+    before = forces(names, x, "float64", device)
+    monkeypatch.setattr(Constants.Deeper, "factor", 0.2)
+    after = forces(ps.law(names.func), x, "float64", device)
+    np.testing.assert_allclose(after, 4 * before, rtol=1e-14)
 
 
 def test_what_is_no_law(refused):

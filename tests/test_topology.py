@@ -1,8 +1,7 @@
 """Tuples of particles: checks, incidence and colours."""
 
 import numpy as np
-import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from particlesim import topology
@@ -38,6 +37,7 @@ pairs = st.lists(
 ).map(np.array)
 
 
+@settings(deadline=None)
 @given(pairs)
 def test_incidence_lists_every_bond_at_both_ends(index):
     rows = topology.incidence(index)
@@ -56,6 +56,7 @@ def test_incidence_lists_every_bond_at_both_ends(index):
     assert (np.diff(rows["particle"]) > 0).all()
 
 
+@settings(deadline=None)
 @given(pairs)
 def test_tuples_of_a_colour_share_no_particle(index):
     color = topology.colors(index)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Boundary(ConstraintBase):
-    """Base of boundaries: a member is its geometry, its kernels and the type of its slack.
+    """Base of boundaries: a member is its geometry, its kernels and the type of their state.
 
     Particles are held off by their radius, C >= 0 with nothing to soften it. Friction takes back
     the tangential way of the substep, up to mu times the normal correction (Macklin et al. 2014,
@@ -42,10 +42,11 @@ class Boundary(ConstraintBase):
         )
 
     def _kernels(self, *shape: Any) -> tuple[wp.Kernel, wp.Kernel, wp.Kernel]:
-        """Slack, projection, bounce."""
+        """Start of a substep, projection, bounce."""
         raise NotImplementedError
 
-    def _slack_type(self, model: Model) -> Any:
+    def _each(self, model: Model) -> Any:
+        """Type of slack and grip: one number, or one an axis."""
         return model.precision.scalar
 
     def _check(self, model: Model, w: int) -> None:
@@ -57,62 +58,49 @@ class Boundary(ConstraintBase):
             peer._check(model, w)
         members = model.members([peer.group for peer in self.peers], self.name)
         self.count = len(members)
-        self.members = model.array(members, wp.int32)
-        self.world = model.array(model.world_of[members], wp.int32)
+        self.held = kernels.held_type(model.precision, self._each(model))()
+        self.held.particle = model.array(members, wp.int32)
+        self.held.world = model.array(model.world_of[members], wp.int32)
         names = (*self.geometry, "friction", "restitution")
         columns = {name: np.array([getattr(peer, name) for peer in self.peers]) for name in names}
         self.Params, self.params = model.parameters(f"{type(self).__name__}Parameters", columns)
-        self.bouncing = bool(columns["restitution"].any())
+        self.rough, self.bouncing = (bool(columns[name].any()) for name in names[-2:])
 
     def attach(self, model: Model, state: State) -> None:
         if not self.count:
             return
-        self.bodies, self.radius = bodies(model, state), state.radius
-        self.easing = Easing(model, self.count, self._slack_type(model), ends=1)
+        each, device = self._each(model), model.device
+        self.bodies = bodies(model, state)
+        self.easing = Easing(model, self.count, each, ends=1)
+        self.held.radius = state.radius
+        self.held.slack, self.held.marked = self.easing.slack, self.easing.marked
+        if self.rough:
+            self.held.grip = wp.zeros(self.count, dtype=each, device=device)
         forces = "force" in state
-        self.force = (
-            state.force if forces else wp.empty(0, dtype=model.precision.vec3, device=model.device)
-        )
-        self.ease, self.push, self.bounce = self._kernels(
+        vec3 = model.precision.vec3
+        self.force = state.force if forces else wp.empty(0, dtype=vec3, device=device)
+        self.start, self.push, self.bounce = self._kernels(
             model.precision, self.Params, "position_error" in state, forces
         )
 
+    def _launch(self, kernel: wp.Kernel, *inputs: Any) -> None:
+        everything = [self.params, self.held, self.bodies, *inputs]
+        launch(kernel, self.count, everything, self.model.device)
+
     def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
         # A static projection goes by the radii as they are, and leaves the marks to the first step.
-        if not self.count or math.isinf(dt) or dt <= 0:
-            return
-        easing = self.easing
-        launch(
-            self.ease,
-            self.count,
-            [self.members, self.world, self.params, easing.marked, self.radius, self.bodies,
-             easing.struct, dt, easing.slack],
-            self.model.device,
-        )  # fmt: skip
-        call(easing.unmark)
+        if self.count and 0 < dt < math.inf:
+            self._launch(self.start, self.easing.struct, dt)
+            call(self.easing.unmark)
 
     def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        if not self.count or dt <= 0:
-            return
-        moving = not math.isinf(dt)
-        launch(
-            self.push,
-            self.count,
-            [self.members, self.world, self.params, self.easing.slack, self.radius, self.bodies,
-             float(moving), dt if moving else 0.0],
-            self.model.device,
-        )  # fmt: skip
+        if self.count and dt > 0:
+            moving = dt < math.inf
+            self._launch(self.push, float(moving), dt if moving else 0.0)
 
     def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        if not self.count or not self.bouncing or dt <= 0:
-            return
-        launch(
-            self.bounce,
-            self.count,
-            [self.members, self.world, self.params, self.easing.slack, self.radius, self.bodies,
-             self.force, dt, 1.0 / dt],
-            self.model.device,
-        )  # fmt: skip
+        if self.count and self.bouncing and dt > 0:
+            self._launch(self.bounce, self.force, dt, 1.0 / dt)
 
     def persistent(self) -> dict[str, wp.array]:
         return self.easing.persistent() if self.count else {}
@@ -231,7 +219,7 @@ class BoxBoundary(Boundary):
     def _kernels(self, *shape: Any) -> tuple[wp.Kernel, wp.Kernel, wp.Kernel]:
         return kernels.box_kernels(*shape)
 
-    def _slack_type(self, model: Model) -> Any:
+    def _each(self, model: Model) -> Any:
         return model.precision.vec3
 
     def _check(self, model: Model, w: int) -> None:

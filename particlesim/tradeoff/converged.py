@@ -17,7 +17,8 @@ from .judges import Judge
 from .plan import OWNER, Plan, Study
 from .run import Run
 
-REFINEMENTS = 7  # at most: to 2^8 of the finest substeps that are judged
+REFINEMENTS = 6  # at most: to 2^7 of the finest substeps that are judged
+SETTLING = 0.7  # of the change two refinements ago; more is no convergence, of any order
 SHARE = 0.1  # of the smallest error that the reference may still change by
 ROUND_OFF = 1e-13  # of the scene's size, float64: nothing below it can be told apart
 
@@ -91,23 +92,32 @@ class Converged(Judge):
         if self.given is not None:
             self._compare(alive, self.given)
             return
-        before = self._positions(alive[0].sim)
-        if not self.refined:
-            if before is None:
-                raise SimulationError(f"{OWNER}: the reference has diverged; give a finer one.")
-            self._compare(alive, before)
-            return
+        x = self._positions(alive[0].sim)
+        if self.refined:
+            self._settle(alive, x)
+        elif x is None:
+            raise SimulationError(f"{OWNER}: the reference has diverged; give a finer one.")
+        else:
+            self._compare(alive, x)
+
+    def _settle(self, runs: Sequence[Run], before: np.ndarray | None) -> None:
+        """Refine until the positions stop changing, and compare with the last of them."""
+        changes: list[float] = []
+        x = before
         for _ in range(REFINEMENTS):
             self._refine()
-            x = self._positions(alive[0].sim)
+            x = self._positions(runs[0].sim)
             if x is not None:
-                self._compare(alive, x)
-                self.change = math.inf if before is None else distance(alive[0].sim, x, before)
-                least = min((run.error for run in alive if math.isfinite(run.error)), default=0.0)
+                self._compare(runs, x)
+                self.change = math.inf if before is None else distance(runs[0].sim, x, before)
+                least = min((run.error for run in runs if math.isfinite(run.error)), default=0.0)
                 if self.change <= max(SHARE * least, ROUND_OFF * np.abs(x).max(initial=0.0)):
                     return
+                changes.append(self.change)
+                if len(changes) > 2 and changes[-1] > SETTLING * changes[-3]:
+                    break  # chaos: further refinement would only cost
             before = x
-        self._complain(before)
+        self._complain(x)
 
     def _refine(self) -> None:
         assert self.plan is not None
@@ -126,7 +136,7 @@ class Converged(Judge):
             f"{OWNER}: the reference must stop changing, got {self.change:.3g} from doubling to "
             f"{substeps} substeps; smaller errors mean nothing: use fewer frames, if the scene is "
             "chaotic, or another error.",
-            stacklevel=4,
+            stacklevel=5,
         )
 
     def _positions(self, like: Simulation) -> np.ndarray | None:

@@ -33,7 +33,8 @@ def converging_part(x: np.ndarray, y: np.ndarray) -> slice:
     if not straight:
         return slice(0, len(x))
     steepest = max(slope for _, _, slope in straight)
-    count, start, _ = max(each for each in straight if each[2] >= STEEP * steepest)
+    least_steep = min(steepest, STEEP * steepest)  # both may be negative
+    count, start, _ = max(each for each in straight if each[2] >= least_steep)
     return slice(start, start + count)
 
 

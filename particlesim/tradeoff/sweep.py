@@ -39,15 +39,17 @@ def tradeoff(
 
     Every setting is run from the start over the same simulated time, after a warm-up that is not
     timed, ``repeats`` times and in turn with the others, so that a noisy machine does not decide.
+    Settings that diverge (the simulation fails, the error is not finite or beyond the bound) are
+    marked, and kept in the table.
 
     Args:
         build: ``build(**options) -> Scene``. What is not given here is taken from its module, if
             that is a scene module: ``settings``, ``frames`` and ``error``.
         vary: Lists of values by name: fields of Settings, and options of ``build``.
-        error: ``error(sim) -> float`` at the end of a run; ``"known"``: that of the module;
-            ``"converged"``: rms distance of the particles from a reference; ``"energy"`` or
-            ``"momentum"``: the largest drift of what should be conserved. None: the known error
-            over the frames that it is known for, otherwise converged.
+        error: ``error(sim) -> float`` at the end of a run, whose size counts; ``"known"``: that of
+            the module; ``"converged"``: rms distance of the particles from a reference;
+            ``"energy"`` or ``"momentum"``: largest drift of what should be conserved. None: the
+            known one over the module's own frames, otherwise converged.
         reference: For ``"converged"``: positions (n, 3), or what the reference run is to take, a
             dict of knobs and options; needed where options of ``build`` vary. Unless ``substeps``
             or ``dt`` is given, substeps are refined until the reference stops changing.
@@ -55,24 +57,19 @@ def tradeoff(
         frames: Frames of ``settings.dt``. None: those of the module, or 240.
         settings: The knobs that do not vary. None: those of the module, or Settings().
         options: Options of ``build`` that do not vary.
-        bound: Error beyond which a setting counts as diverged. None: ten times what the
-            motion and the size of the scene amount to, for known answers infinite.
+        bound: Error beyond which a setting counts as diverged. None: ten times what the motion
+            or the size of the scene amounts to; infinite for known answers.
         device: As for Simulation.
-        progress: True for a bar on the terminal, or a function of (frames done, all frames).
-
-    Returns:
-        The table. Settings that diverge (the simulation fails, the error is not finite or beyond
-        the bound) are marked and kept in it.
+        progress: True for a bar, or a function of (frames done, all frames).
 
     Raises:
-        ValueError: Names that are neither, values out of range, no frames. TypeError: Not a
-            function. SimulationError: The reference itself diverges, however fine.
+        ValueError: Unknown names, values out of range. SimulationError: The reference diverges.
 
     Example:
         >>> def fall(height=1.0):
         ...     scene = Scene()
-        ...     ball = scene.add_particles([(0, height, 0)])
-        ...     gravity = scene.add_interaction(UniformGravity((0, -10, 0)))
+        ...     _ = scene.add_particles([(0, height, 0)])
+        ...     _ = scene.add_interaction(UniformGravity((0, -10, 0)))
         ...     return scene
         >>> table = tradeoff(
         ...     fall, {"substeps": [1, 2, 4]}, frames=10, device="cpu", repeats=1,
@@ -88,23 +85,12 @@ def tradeoff(
     if bound is not None:
         bound = validate.number(OWNER, "bound", bound, above=0.0, infinite=True)
     runs = [Run(plan, study.simulation(plan)) for plan in plans]
-    with contextlib.ExitStack() as stack:
-        if progress is True:
-            progress = stack.enter_context(bar(study.label))
-        measure(runs, judge, repeats, progress if callable(progress) else None)
+    with bar(study.label) if progress is True else contextlib.nullcontext(progress) as show:
+        measure(runs, judge, repeats, show if callable(show) else None)
     limit = judge.bound if bound is None else bound
     mark(runs, limit)
-    return Tradeoff(
-        scene=study.label,
-        error=judge.describe(),
-        rows=[row(run) for run in runs],
-        vary={name: distinct([plan.values[name] for plan in plans]) for name in vary},
-        duration=study.duration,
-        repeats=repeats,
-        device=str(runs[0].sim.device),
-        bound=limit,
-        process_bytes=process_bytes(),
-    )
+    names = {name: distinct([plan.values[name] for plan in plans]) for name in vary}
+    return table(study, runs, names, judge.describe(), limit, repeats)
 
 
 def choose_judge(study: Study, plans: Sequence[Plan], error: Any, reference: Any) -> Judge:
@@ -165,6 +151,28 @@ def mark(runs: Sequence[Run], bound: float) -> None:
         if not run.cause and not run.error <= bound:
             which = "be finite" if not math.isfinite(run.error) else f"be at most {bound:g}"
             run.cause = f"error must {which}, got {run.error:g}"
+
+
+def table(
+    study: Study,
+    runs: Sequence[Run],
+    vary: dict[str, list[Any]],
+    error: str,
+    bound: float,
+    repeats: int,
+) -> Tradeoff:
+    """The table of runs that are done and judged."""
+    return Tradeoff(
+        scene=study.label,
+        error=error,
+        rows=[row(run) for run in runs],
+        vary=vary,
+        duration=study.duration,
+        repeats=repeats,
+        device=str(runs[0].sim.device),
+        bound=bound,
+        process_bytes=process_bytes(),
+    )
 
 
 def distinct(values: Sequence[Any]) -> list[Any]:
