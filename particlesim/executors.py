@@ -17,7 +17,7 @@ from .threads import Shared, Team
 
 LARGEST_GRAPH = 4096  # operations
 WORTH_SHARING = 5e-5  # seconds of a launch; handing it round takes a fifth of that
-CHUNKS_PER_THREAD = 4  # so that a thread that is held up does not hold up the others
+CHUNKS_PER_THREAD = 16  # so that a thread that is held up does not hold up the others
 
 
 class GraphExecutor:

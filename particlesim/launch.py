@@ -17,7 +17,7 @@ from typing import Any
 
 import warp as wp
 
-CHUNK = 1024  # particles under which a launch is not worth cutting
+CHUNK = 512  # particles under which a launch is not worth cutting
 
 _recording: list[Program] = []
 _owners: list[str] = ["loop"]

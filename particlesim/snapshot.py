@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import warp as wp
 
-from .launch import call
+from .kernels.copy import copy_kernel
+from .launch import launch
 
 if TYPE_CHECKING:
     from .simulation import Simulation
@@ -41,8 +42,8 @@ class Snapshot:
     def take(self) -> None:
         """Copy the present; recorded as part of the frame."""
         for name, array in self.arrays.items():
-            copy = self.copies[name]
-            call(lambda copy=copy, array=array: wp.copy(copy, array))  # type: ignore[misc]
+            inputs = [array, self.copies[name]]
+            launch(copy_kernel(array.dtype), len(array), inputs, array.device)
 
     def restore(self) -> None:
         """Go back; neighbour rows are made again from the positions that they were made from."""

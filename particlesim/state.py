@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from .kernels.copy import zero_kernel
+from .launch import launch
 from .model import Model
 
 # The engine's own arrays: None for numbers, 3 for vectors.
@@ -105,9 +107,8 @@ class State:
     def clear_forces(self) -> None:
         """Set all forces to zero, if there are forces."""
         if "force" in self.arrays:
-            from .launch import call
-
-            call(self.arrays["force"].zero_)
+            force = self.arrays["force"]
+            launch(zero_kernel(force.dtype), self.count, [force], force.device)
 
     def reset(self, worlds: Iterable[int]) -> None:
         """Put the rows of these worlds back to their start values."""

@@ -1,8 +1,8 @@
 """A team of threads that share recorded launches (see :mod:`particlesim.kernels.team`).
 
 Between two shared launches lie tens of microseconds, and waking a thread that sleeps takes
-hundreds. So a worker looks for the next launch in native code for about a millisecond before it
-goes to sleep.
+hundreds. So a worker looks for the next launch in native code for some milliseconds before it goes
+to sleep.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ import warp as wp
 
 from .kernels.team import DONE, LEAVE, POSTS, RING, STATE, serve_kernel, share_kernel
 
-# A worker looks for work for about a millisecond. The caller, who waits for the workers, looks for
-# a shorter while and then lets others run: one of them may be the worker that it waits for.
-WORKER_LOOKS, CALLER_LOOKS = 1_000_000, 100_000
+# A worker looks for work for about five milliseconds. The caller, who waits for the workers, looks
+# for a shorter while and then lets others run: one of them may be the worker that it waits for.
+WORKER_LOOKS, CALLER_LOOKS = 10_000_000, 100_000
 
 
 class Shared:
