@@ -21,21 +21,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pxr import Gf, Sdf, Tf, Vt
 
+from .usd_geometry import (
+    APERTURE,
+    CORNERS,
+    EDGES,
+    FACES,
+    FOCAL_LENGTH,
+    VIEW,
+    bounding_box,
+    extent,
+    pose_of,
+    square_on,
+    unit_sphere,
+    viewpoint,
+)
+
 if TYPE_CHECKING:
     from .usd_info import Color, LinksPrim, PointsPrim, Shape, StageInfo
 
 Types = Sdf.ValueTypeNames
 WORLD = Sdf.Path("/World")
 CLEAR = 0.1  # opacity of what particles are inside of
-FOCAL_LENGTH = 35.0
-APERTURE = np.array([36.0, 20.25])  # 16:9, in the units of the focal length
-VIEW = (0.35, 0.35, 1.0)  # from the scene to the camera: right, up, out
-# The corners of the unit box in counting order, its edges, and its faces seen from outside.
-CORNERS = np.array([[k >> 2 & 1, k >> 1 & 1, k & 1] for k in range(8)], dtype=np.float64)
-EDGES = [(a, a | bit) for bit in (1, 2, 4) for a in range(8) if not a & bit]
-FACES = np.array(
-    [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-)
 
 
 @dataclass(frozen=True)
@@ -72,16 +78,6 @@ def layout(info: StageInfo) -> Layout:
 def primvar(name: str) -> str:
     """Name of a field's primvar, without the namespace."""
     return Tf.MakeValidIdentifier(name)
-
-
-def extent(points: np.ndarray, width: np.ndarray | float | None) -> np.ndarray:
-    """Lower and upper corner of (n, 3) points with diameters, (n,), one or none; (2, 3)."""
-    half = np.float32(0.5) * np.asarray(0.0 if width is None else width, dtype=np.float32)
-    # Column by column: a reduction of (n, 3) over its rows takes ten times as long.
-    columns = [points[:, k] for k in range(3)]
-    lower = [(x - half).min() if half.ndim else x.min() - half for x in columns]
-    upper = [(x + half).max() if half.ndim else x.max() + half for x in columns]
-    return np.array([lower, upper], dtype=np.float32)
 
 
 def sized(info: StageInfo, x: np.ndarray) -> StageInfo:
@@ -197,12 +193,12 @@ class _Root:
     def __init__(self, layer: Sdf.Layer, info: StageInfo, x: np.ndarray):
         self.layer = layer
         self.materials: dict[tuple[str, Color, float], Sdf.Path] = {}
-        self.box = _bounds(info, x)
+        self.box = bounding_box(info, x)
         self.diagonal = float(np.linalg.norm(self.box[1] - self.box[0])) or 1.0
         up = np.array([0.0, 1.0, 0.0] if info.up_axis == "y" else [0.0, 0.0, 1.0])
         out = np.array([0.0, 0.0, 1.0] if info.up_axis == "y" else [0.0, -1.0, 0.0])
         self.axes = np.array([[1.0, 0.0, 0.0], up, out])
-        self.eye, self.distance = _viewpoint(self.box, self.axes, self.diagonal)
+        self.eye, self.distance = viewpoint(self.box, self.axes, self.diagonal)
         self._define(WORLD, "Xform")
 
     def points(self, prim: PointsPrim, path: Sdf.Path, fields: dict[str, int]) -> None:
@@ -233,7 +229,7 @@ class _Root:
         first, second = shape.parameters
         if shape.kind == "plane":
             behind = bool(np.dot(self.eye - first, second) <= 0)
-            square = _square(self.box, first, second, 2.0 * self.diagonal)
+            square = square_on(self.box, first, second, 2.0 * self.diagonal)
             self._mesh(path, square, np.arange(4)[None], shape, shape.container or behind)
         elif shape.kind == "box":
             corners = first + CORNERS * (second - first)
@@ -241,7 +237,7 @@ class _Root:
             self.outline(path.AppendChild("edges"), np.array([first, second]), shape.color)
         else:
             # No UsdGeomSphere: Blender gives those no material, so that a clear one hid particles.
-            normals, faces = _sphere(16)
+            normals, faces = unit_sphere(16)
             points = first + second * normals
             spec = self._mesh(path, points, faces, shape, shape.container)
             _set(spec, "normals", Types.Normal3fArray, _vectors(normals), "vertex")
@@ -255,7 +251,7 @@ class _Root:
         # Far: what flies off, and the ends of planes.
         near_and_far = Gf.Vec2f(0.01 * self.distance, 100.0 * self.distance)
         _set(spec, "clippingRange", Types.Float2, near_and_far)
-        pose = _pose(np.array(VIEW) @ self.axes, self.axes[1], self.eye)
+        pose = pose_of(np.array(VIEW) @ self.axes, self.axes[1], self.eye)
         _place(spec, pose)
 
     def lights(self) -> None:
@@ -264,7 +260,7 @@ class _Root:
         _set(key, "inputs:intensity", Types.Float, 1.0)
         _set(key, "inputs:normalize", Types.Bool, True)  # brightness does not depend on the angle
         _set(key, "inputs:angle", Types.Float, 2.0)
-        pose = _pose(np.array([-0.6, 1.2, 0.8]) @ self.axes, self.axes[1], np.zeros(3))
+        pose = pose_of(np.array([-0.6, 1.2, 0.8]) @ self.axes, self.axes[1], np.zeros(3))
         _place(key, pose)
         sky = self._define(WORLD.AppendPath("lights/sky"), "DomeLight")
         _set(sky, "inputs:intensity", Types.Float, 0.5)
@@ -383,78 +379,3 @@ def _place(spec: Sdf.PrimSpec, pose: Gf.Matrix4d) -> None:
 
 def _vectors(array: np.ndarray) -> Vt.Vec3fArray:
     return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(array, dtype=np.float32))
-
-
-def _bounds(info: StageInfo, x: np.ndarray) -> np.ndarray:
-    """Corners of what the camera should see: particles, boundaries, near planes; (2, 3)."""
-    boxes = [extent(x[prim.indices], prim.widths).astype(np.float64) for prim in info.points]
-    for shape in info.shapes:
-        first, second = shape.parameters
-        if shape.kind == "box":
-            boxes.append(np.array([first, second]))
-        elif shape.kind == "sphere":
-            boxes.append(np.array([first - second, first + second]))
-    if info.periodic is not None:
-        boxes.append(np.where(np.isnan(info.periodic), boxes[0], info.periodic))
-    lower, upper = np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))
-    center, diagonal = 0.5 * (lower + upper), np.linalg.norm(upper - lower)
-    for shape in info.shapes:
-        if shape.kind == "plane":
-            foot = _foot(center, *shape.parameters)
-            if np.linalg.norm(foot - center) <= 2.0 * diagonal:
-                lower, upper = np.minimum(lower, foot), np.maximum(upper, foot)
-    return np.array([lower, upper])
-
-
-def _foot(at: np.ndarray, point: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """The point of a plane that is nearest to ``at``."""
-    return at - normal * np.dot(normal, at - point) / np.dot(normal, normal)
-
-
-def _square(box: np.ndarray, point: np.ndarray, normal: np.ndarray, half: float) -> np.ndarray:
-    """Corners of a square of a plane under the middle of a box, facing its normal, (4, 3)."""
-    n = normal / np.linalg.norm(normal)
-    u = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
-    u *= half / np.linalg.norm(u)
-    v = np.cross(n, u)
-    return _foot(box.mean(axis=0), point, normal) + np.array([-u - v, u - v, u + v, v - u])
-
-
-def _sphere(cuts: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points of the unit sphere (n, 3) and quads (m, 4): a cube with cut faces, blown up."""
-    steps = np.tan(np.linspace(-0.25 * np.pi, 0.25 * np.pi, cuts + 1))  # cuts at equal angles
-    patches = []
-    for a, b, _, d in (2.0 * CORNERS - 1.0)[FACES]:
-        u, v = (b - a) / 2.0, (d - a) / 2.0
-        patches.append(a + u + v + steps[:, None, None] * u + steps[None, :, None] * v)
-    cube = np.reshape(patches, (-1, 3))
-    index = np.arange(len(cube)).reshape(6, cuts + 1, cuts + 1)
-    quads = [index[:, :-1, :-1], index[:, 1:, :-1], index[:, 1:, 1:], index[:, :-1, 1:]]
-    return cube / np.linalg.norm(cube, axis=1)[:, None], np.stack(quads, axis=-1).reshape(-1, 4)
-
-
-def _viewpoint(box: np.ndarray, axes: np.ndarray, size: float) -> tuple[np.ndarray, float]:
-    """Where the camera sees all of a box, and how far that is from its middle."""
-    center = box.mean(axis=0)
-    right, up, back = _frame(np.array(VIEW) @ axes, axes[1])
-    corners = box[0] + CORNERS * (box[1] - box[0]) - center
-    slope = 0.5 * APERTURE / FOCAL_LENGTH
-    needed = np.abs(corners @ np.array([right, up]).T) / slope + (corners @ back)[:, None]
-    distance = max(1.1 * float(needed.max()), size)
-    return center + distance * back, distance
-
-
-def _frame(back: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Right, up and back of what looks against ``back``, orthonormal."""
-    back = back / np.linalg.norm(back)
-    right = np.cross(up, back)
-    right /= np.linalg.norm(right)
-    return right, np.cross(back, right), back
-
-
-def _pose(back: np.ndarray, up: np.ndarray, at: np.ndarray) -> Gf.Matrix4d:
-    """Transform of a camera or light, which look along their -z; USD's vectors are rows."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = _frame(back, up)
-    matrix[3, :3] = at
-    return Gf.Matrix4d(*matrix.ravel().tolist())
