@@ -45,11 +45,16 @@ class Team:
 
     def __init__(self, threads: int):
         self._board = _Board()
-        self._share = self._board.command(share_kernel(), CALLER_LOOKS)
-        # The workers know the board only, so that the team can be let go.
+        self._share = self._board.command(share_kernel(), CALLER_LOOKS, back=False)
+        # Recorded here: Warp compiles on one thread. The workers know the board only, so that the
+        # team can be let go.
+        serves = [
+            self._board.command(serve_kernel(), WORKER_LOOKS, back=index % 2 == 0)
+            for index in range(threads - 1)
+        ]
         self.workers = [
-            threading.Thread(target=_work, args=(self._board,), daemon=True)
-            for _ in range(threads - 1)
+            threading.Thread(target=_work, args=(self._board, serve), daemon=True)
+            for serve in serves
         ]
         for worker in self.workers:
             worker.start()
@@ -81,9 +86,10 @@ class _Board:
         self.asleep = 0
         self.awake = threading.Condition()
 
-    def command(self, kernel: Any, looks: int) -> Any:
-        """A recorded launch of one of the team's kernels."""
-        return wp.launch(kernel, 1, [0, self.memory, looks], device="cpu", record_cmd=True)
+    def command(self, kernel: Any, looks: int, back: bool) -> Any:
+        """A recorded launch of one of the team's kernels; chunks are taken from front or back."""
+        inputs = [0, self.memory, looks, int(back)]
+        return wp.launch(kernel, 1, inputs, device="cpu", record_cmd=True)
 
     def post(self, shared: Shared) -> None:
         """Offer the commands; nothing of an earlier post is still under way."""
@@ -104,8 +110,7 @@ class _Board:
             self.awake.notify_all()
 
 
-def _work(board: _Board) -> None:
-    serve = board.command(serve_kernel(), WORKER_LOOKS)
+def _work(board: _Board, serve: Any) -> None:
     while not board.words[LEAVE]:
         serve.launch()
         with board.awake:
