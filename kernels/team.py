@@ -1,10 +1,11 @@
 """How CPU threads share the chunks of a launch: in native code, without Python's lock.
 
 Taking the lock wakes a sleeping thread, which costs more than many a launch. A *board* in shared
-memory says what is to be done. ``state`` counts posts in its upper half and, in its lower half, the
-chunks of the latest post that have been taken from the front (16 bits) and from the back (16 bits):
-one atomic increment takes a chunk and tells of which post it is, so that a thread that comes late
-never runs a chunk twice or of the wrong launch. The caller takes from the front and its first
+memory says what is to be done. Its ``state`` holds, 16 bits each, the number of the post, how many
+chunks it has, and how many were taken from the back and from the front. One atomic increment takes
+a chunk and returns all four: whoever comes late is told by the very same word that nothing is left,
+or takes a chunk of the post that is current, and never one twice or of another launch.
+The caller takes from the front and its first
 worker from the back, so that a particle mostly stays with one thread, and in its cache.
 """
 
@@ -14,25 +15,25 @@ import warp as wp
 
 from .precision import native, register
 
-# Words of the board: state, chunks done, leave, then post after post, in turn: table and count.
-STATE, DONE, LEAVE, POSTS, RING = 0, 1, 2, 8, 64
+# Words of the board: state, chunks done, leave, the post to be made (table and count; none if 0),
+# then the tables of the latest posts in turn. A table stays until all of its chunks are done.
+STATE, DONE, LEAVE, TABLE, COUNT, POSTS, RING = 0, 1, 2, 3, 4, 8, 64
 
 _SHARED = f"""
     unsigned long long* b = (unsigned long long*)board.data;
     typedef void (*entry)(void*, void*);
-    auto left = [](unsigned long long state, unsigned long long count) -> bool {{
-        return (state & 0xffffull) + (state >> 16 & 0xffffull) < count;
+    auto left = [](unsigned long long state) -> bool {{
+        return (state & 0xffffull) + (state >> 16 & 0xffffull) < (state >> 32 & 0xffffull);
     }};
     auto take = [&]() -> bool {{
-        const unsigned long long now = __atomic_load_n(b + {STATE}, __ATOMIC_ACQUIRE);
-        const unsigned long long* seen = b + {POSTS} + 2 * ((now >> 32) % {RING});
-        if (!left(now, __atomic_load_n(seen + 1, __ATOMIC_ACQUIRE))) return false;
+        if (!left(__atomic_load_n(b + {STATE}, __ATOMIC_ACQUIRE))) return false;
         const unsigned long long step = back ? 1ull << 16 : 1ull;
         const unsigned long long got = __atomic_fetch_add(b + {STATE}, step, __ATOMIC_ACQ_REL);
-        const unsigned long long* post = b + {POSTS} + 2 * ((got >> 32) % {RING});
-        if (!left(got, post[1])) return true;
-        const unsigned long long k = back ? post[1] - 1 - (got >> 16 & 0xffffull) : got & 0xffffull;
-        const unsigned long long* chunk = (const unsigned long long*)post[0] + 3 * k;
+        if (!left(got)) return true;
+        const unsigned long long last = (got >> 32 & 0xffffull) - 1;
+        const unsigned long long k = back ? last - (got >> 16 & 0xffffull) : got & 0xffffull;
+        const unsigned long long table = b[{POSTS} + (got >> 48) % {RING}];
+        const unsigned long long* chunk = (const unsigned long long*)table + 3 * k;
         ((entry)chunk[0])((void*)chunk[1], (void*)chunk[2]);
         __atomic_fetch_add(b + {DONE}, 1ull, __ATOMIC_ACQ_REL);
         return true;
@@ -61,11 +62,17 @@ def serve_kernel() -> wp.Kernel:
 
 @functools.cache
 def share_kernel() -> wp.Kernel:
-    """Kernel of the caller: take chunks of the latest post, then wait a while for the others."""
+    """Kernel of the caller: make the post, take chunks of it, then wait a while for the others."""
     snippet = f"""{_SHARED}
+    if (b[{COUNT}]) {{
+        const unsigned long long post = (b[{STATE}] >> 48) + 1;
+        b[{POSTS} + post % {RING}] = b[{TABLE}];
+        __atomic_store_n(b + {DONE}, 0ull, __ATOMIC_RELEASE);
+        __atomic_store_n(b + {STATE}, post << 48 | b[{COUNT}] << 32, __ATOMIC_RELEASE);
+        b[{COUNT}] = 0;
+    }}
     while (take()) {{}}
-    const unsigned long long now = __atomic_load_n(b + {STATE}, __ATOMIC_ACQUIRE);
-    const unsigned long long count = b[{POSTS} + 2 * ((now >> 32) % {RING}) + 1];
+    const unsigned long long count = b[{STATE}] >> 32 & 0xffffull;
     for (int k = 0; k < looks && __atomic_load_n(b + {DONE}, __ATOMIC_ACQUIRE) < count; ++k) {{}}
 """
 

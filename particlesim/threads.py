@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from .kernels.team import DONE, LEAVE, POSTS, RING, STATE, serve_kernel, share_kernel
+from .kernels.team import COUNT, DONE, LEAVE, POSTS, RING, TABLE, serve_kernel, share_kernel
 
 # A worker looks for work for about five milliseconds. The caller, who waits for the workers, looks
 # for a shorter while and then lets others run: one of them may be the worker that it waits for.
@@ -80,7 +80,7 @@ class _Board:
     """The shared memory, and where workers sleep."""
 
     def __init__(self) -> None:
-        self.memory = wp.zeros(POSTS + 2 * RING, dtype=wp.uint64, device="cpu")
+        self.memory = wp.zeros(POSTS + RING, dtype=wp.uint64, device="cpu")
         self.words = self.memory.numpy()
         self.posts = 0
         self.asleep = 0
@@ -94,11 +94,7 @@ class _Board:
     def post(self, shared: Shared) -> None:
         """Offer the commands; nothing of an earlier post is still under way."""
         self.posts += 1
-        at = POSTS + 2 * (self.posts % RING)
-        self.words[DONE] = 0
-        self.words[at] = shared.table.ctypes.data
-        self.words[at + 1] = shared.count
-        self.words[STATE] = (self.posts % 2**32) << 32
+        self.words[TABLE], self.words[COUNT] = shared.table.ctypes.data, shared.count
         if self.asleep:
             with self.awake:
                 self.awake.notify_all()

@@ -44,7 +44,7 @@ def build(
             viscosity=ps.ArtificialViscosity(1.0, 2.0),
         )
     )
-    scene.add_interaction(ps.Gravity(constant=1.0, softening=0.5 * h))
+    scene.add_interaction(ps.Gravity(G=1.0, softening=0.5 * h))
     return scene
 
 

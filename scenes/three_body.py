@@ -33,7 +33,7 @@ def build(radius: float = 0.05) -> ps.Scene:
         radius=radius,
         group="bodies",
     )
-    scene.add_interaction(ps.Gravity(constant=1.0))
+    scene.add_interaction(ps.Gravity(G=1.0))
     return scene
 
 

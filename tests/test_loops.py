@@ -77,7 +77,7 @@ CASES = {
     "force_shift": mie(12, 6, "force_shift"),
     "mie_9_5": mie(9, 5, "cut"),
     "gravity": Case(
-        lambda: ps.Gravity(constant=2.0, softening=0.1),
+        lambda: ps.Gravity(G=2.0, softening=0.1),
         lambda r, c: -2 * c["mass"] / np.sqrt(r**2 + 0.01),
         lambda r, c: -2 * c["mass"] * r / (r**2 + 0.01) ** 1.5,
         None,

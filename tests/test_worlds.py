@@ -100,7 +100,7 @@ def test_copies_of_one_scene(device):
 PARAMETERS = {
     "LennardJones": lambda k: ps.LennardJones(epsilon=k, sigma=1 + 0.1 * k, cutoff=2 + 0.2 * k),
     "PairPotential": lambda k: ps.PairPotential(screened, cutoff=1.0 + k, screening=k),
-    "Gravity": lambda k: ps.Gravity(constant=k, softening=0.1 * k),
+    "Gravity": lambda k: ps.Gravity(G=k, softening=0.1 * k),
     "Springs": lambda k: ps.Springs([(0, 1)] * k, 1.0 + k, 0.5 * k, 0.1 * k),
     "UniformGravity": lambda k: ps.UniformGravity((0, -k, 0)),
     "ConstantForce": lambda k: ps.ConstantForce((k, 0, 0)),

@@ -84,6 +84,7 @@ class Constraint(ConstraintBase):
         **parameters: Any,
     ):
         self.law = as_law(law)
+        self.law.check_derivable(self.name)
         size = self._size(parameters)
         self.particles = topology.tuples(self.name, "particles", particles, size)
         self.inequality = bool(inequality)
@@ -141,7 +142,7 @@ class Constraint(ConstraintBase):
 
     def kind(self) -> tuple[Any, ...]:
         return (
-            type(self), self.law.func, self.particles.shape[1], self.inequality,
+            type(self), self.law.key, self.particles.shape[1], self.inequality,
             self.break_force is None, tuple(self.parameters),
         )  # fmt: skip
 

@@ -29,17 +29,17 @@ class Gravity(Pair):
 
     Args:
         group: Which particles attract each other; None: all.
-        constant: G [length^3 / (mass time^2)].
+        G: [length^3 / (mass time^2)].
         softening: s [length], at least 0.
 
     Example:
-        >>> Gravity(constant=1.0, softening=0.01).cutoff is None
+        >>> Gravity(G=1.0, softening=0.01).cutoff is None
         True
     """
 
-    def __init__(self, group: Any = None, constant: float = 1.0, softening: float = 0.0):
+    def __init__(self, group: Any = None, G: float = 1.0, softening: float = 0.0):
         values = {
-            "constant": validate.number(self.name, "constant", constant),
+            "constant": validate.number(self.name, "G", G),
             "softening": validate.number(
                 self.name, "softening", softening, minimum=0.0, unit="length"
             ),

@@ -12,7 +12,7 @@ def orbit(eccentricity, steps, device, orbits=10):
     scene = ps.Scene()
     scene.add_particles([(0, 0, 0)], pinned=True)
     scene.add_particles([(1 - e, 0, 0)], velocity=(0, np.sqrt((1 + e) / (1 - e)), 0))
-    scene.add_interaction(ps.Gravity(constant=1.0))
+    scene.add_interaction(ps.Gravity(G=1.0))
     settings = ps.Settings(
         dt=2 * np.pi / steps, substeps=1, integrator="velocity_verlet", precision="float64"
     )
@@ -60,7 +60,7 @@ def test_figure_eight(device):
     start = np.array([first, -first, 0 * first])
     scene = ps.Scene()
     scene.add_particles(start, velocity=[-third / 2, -third / 2, third])
-    scene.add_interaction(ps.Gravity(constant=1.0))
+    scene.add_interaction(ps.Gravity(G=1.0))
     settings = ps.Settings(
         dt=period / frames, substeps=100, integrator="velocity_verlet", precision="float64"
     )
@@ -88,7 +88,7 @@ def test_a_uniform_sphere_holds_three_fifths(device):
     x = ps.sample.uniform_sphere((0, 0, 0), 1.0, n, seed=0)
     scene = ps.Scene()
     scene.add_particles(x, mass=1 / n)
-    scene.add_interaction(ps.Gravity(constant=1.0))
+    scene.add_interaction(ps.Gravity(G=1.0))
     found = ps.Simulation(scene, ps.Settings(precision="float64"), device=device).diagnostics()
     assert found.potential[0] == pytest.approx(-3 / 5, rel=n ** (-2 / 3) + 1 / np.sqrt(n))
     # Scale-free forces: the virial sum is the energy.

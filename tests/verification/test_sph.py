@@ -62,7 +62,7 @@ def relaxed_polytrope(count):
     scene.add_interaction(
         ps.SPH(star, smoothing_length=spacing, equation_of_state=ps.Polytrope(2 / np.pi, index=1.0))
     )
-    scene.add_interaction(ps.Gravity(constant=1.0, softening=0.3 * spacing))
+    scene.add_interaction(ps.Gravity(G=1.0, softening=0.3 * spacing))
     scene.add_interaction(ps.Drag(linear=4.0 / count))
     # The speed of sound is at most sqrt(2 K rho) = 1: dt = 0.3 h / c.
     settings = ps.Settings(

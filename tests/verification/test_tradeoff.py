@@ -18,7 +18,7 @@ def kepler():
     start = (1 - ECCENTRICITY, 0, 0)
     speed = np.sqrt((1 + ECCENTRICITY) / (1 - ECCENTRICITY))
     scene.add_particles([start], velocity=(0, speed, 0), group="planet")
-    scene.add_interaction(ps.Gravity(constant=1.0))
+    scene.add_interaction(ps.Gravity(G=1.0))
     return scene
 
 
