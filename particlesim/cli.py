@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import math
 import os
 import sys
 import tempfile
@@ -139,7 +140,9 @@ def run(
             )  # fmt: skip
         summary = meter.summary()
         if hasattr(module, "error") and frames is None and worlds is None:
-            summary += f"; error {module.error(sim):.3g}"
+            error = module.error(sim)
+            if not math.isnan(error):  # nan: nothing is known of this moment
+                summary += f"; error {error:.3g}"
         typer.echo(summary if out is None else f"{summary}; written to {out}")
 
 
