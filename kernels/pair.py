@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from .loops import ALL, Pairs, Periodicity, box_type, native_loop, plain_loop
+from .loops import Pairs, Periodicity, box_type, native_loop, plain_loop
 from .precision import Precision, function, function_from_source, register
 
 # A pair closer than p.closest is taken as that far apart, along a fixed direction: coincident
@@ -161,6 +161,3 @@ def store_measure(precision: Precision, data: Any, params: Any, out: Any) -> wp.
         o.virial[particle] = o.virial[particle] + wp.float64(total[1])
 
     return function(keep_measure)
-
-
-__all__ = ["ALL", "add_force", "force_term", "measure_term", "pair_kernel", "store_measure"]

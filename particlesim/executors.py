@@ -83,7 +83,6 @@ class ThreadExecutor:
     name = "threads"
 
     def __init__(self, frame: Frame, threads: int):
-        frame.load()
         self.frame = frame
         self._flags: dict[int, np.ndarray] = {}
         self._whole: dict[int, Any] = {}
