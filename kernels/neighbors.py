@@ -1,7 +1,8 @@
 """Verlet lists: cell coordinates, rows from a hash grid or by looking at a whole world.
 
-The grid is built in cell coordinates u = (x - origin) * scale, in which every cell is a unit cube.
-On a periodic axis scale = cells / length, so that the grid's wrap by modulo is exactly the
+The grid is built in cell coordinates u = turn (x - origin), in which every cell is a unit cube.
+``turn`` scales, and takes the axes in the order that has the grid's order follow the particles' own.
+On a periodic axis it scales by cells / length, so that the grid's wrap by modulo is exactly the
 periodicity of the box, whatever its shape. Slots (the loop's own order) follow the grid's order.
 """
 
@@ -26,10 +27,10 @@ _LANES = ",".join(
 
 @functools.cache
 def cells_type(precision: Precision) -> Any:
-    """Origin and scale of a world's cell coordinates, and the first slot of the world."""
+    """Origin and turn of a world's cell coordinates, and the first slot of the world."""
     return structure(
         f"Cells_{precision.name}",
-        {"origin": precision.vec3, "scale": precision.vec3, "first": wp.int32, "world": wp.int32},
+        {"origin": precision.vec3, "turn": precision.mat33, "first": wp.int32, "world": wp.int32},
     )
 
 
@@ -160,8 +161,11 @@ def moved_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
         w = world[k]
         d = image(x[members[k]] - x_listed[k], box[w])
         if wp.dot(d, d) > margin_squared[w]:
-            moved[w] = 1  # every writer writes the same
-            any_moved[0] = 1
+            # Every writer writes the same, and once: threads would fight over the cache line.
+            if moved[w] == 0:
+                moved[w] = 1
+            if any_moved[0] == 0:
+                any_moved[0] = 1
 
     return flag_moved
 
@@ -198,7 +202,7 @@ def build_kernels(precision: Precision) -> SimpleNamespace:
         first: int, cells: Cells, x_listed: wp.array(dtype=vec3), u_out: wp.array(dtype=vec3)
     ):
         k = cells.first + first + wp.tid()
-        u_out[k] = wp.cw_mul(x_listed[k] - cells.origin, cells.scale)
+        u_out[k] = cells.turn * (x_listed[k] - cells.origin)
 
     @register
     def sort_slots(
@@ -262,7 +266,7 @@ def grid_rows_kernel(precision: Precision, periodic: Periodicity, vectorised: bo
         i = cells.first + first + wp.tid()
         b = box[cells.world]
         reach2 = reach_squared[cells.world]
-        u = wp.cw_mul(vec3(x[0, i], x[1, i], x[2, i]) - cells.origin, cells.scale)
+        u = cells.turn * (vec3(x[0, i], x[1, i], x[2, i]) - cells.origin)
         n = int(0)
         if wp.static(vectorised):
             n = scan(i, 0, 0, 0, pairs, b, x, reach2)  # has Warp emit it before `visit`

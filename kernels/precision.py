@@ -38,6 +38,7 @@ class Precision:
     name: str
     scalar: type
     vec3: type
+    mat33: type
     numpy: type
     c: str  # the scalar's name in native code
 
@@ -46,8 +47,8 @@ class Precision:
         return wp.types.vector(length=length, dtype=self.scalar)
 
 
-FLOAT32 = Precision("float32", wp.float32, wp.vec3f, np.float32, "float")
-FLOAT64 = Precision("float64", wp.float64, wp.vec3d, np.float64, "double")
+FLOAT32 = Precision("float32", wp.float32, wp.vec3f, wp.mat33f, np.float32, "float")
+FLOAT64 = Precision("float64", wp.float64, wp.vec3d, wp.mat33d, np.float64, "double")
 PRECISIONS = {"float32": FLOAT32, "float64": FLOAT64}
 
 

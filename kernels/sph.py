@@ -146,7 +146,7 @@ def cell_coordinates_kernel(precision: Precision) -> wp.Kernel:
     @register
     def point_cells(first: int, cells: Cells, x: wp.array(dtype=vec3), u_out: wp.array(dtype=vec3)):
         k = first + wp.tid()
-        u_out[k] = wp.cw_mul(x[k] - cells.origin, cells.scale)
+        u_out[k] = cells.turn * (x[k] - cells.origin)
 
     return point_cells
 

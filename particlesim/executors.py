@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
 import warp as wp
 
-from .launch import CHUNK, Call, Frame, Launch, Program
+from .launch import CHUNK, Frame, Launch, Program, When
 from .settings import Settings
-from .threads import Shared, Team
+from .threads import Chain, Team
 
 LARGEST_GRAPH = 4096  # operations
-WORTH_SHARING = 5e-5  # seconds of a launch; handing it round takes a fifth of that
-CHUNKS_PER_THREAD = 16  # so that a thread that is held up does not hold up the others
+CHUNK_SECONDS = 4e-6  # a chunk that takes less is not worth its handing out
+CHUNKS_PER_THREAD = (1, 4, 16)  # many, so that a thread that is held up delays nobody
 
 
 class GraphExecutor:
@@ -78,62 +78,80 @@ class EagerExecutor:
 
 
 class ThreadExecutor:
-    """Replays a frame launch by launch, each cut into chunks over CPU threads."""
+    """Replays a frame in native code, its larger launches cut into chunks over CPU threads."""
 
     name = "threads"
 
     def __init__(self, frame: Frame, threads: int):
-        self.frame = frame
-        self._flags: dict[int, np.ndarray] = {}
-        self._whole: dict[int, Any] = {}
-        self._chunks: dict[int, Shared] = {}
-        self._shared: dict[int, bool] = {}  # whether a launch is worth sharing, once timed
-        for part in frame.parts:
-            for operation in part.launches():
-                operation.record(1)
-                self._whole[id(operation)] = operation.commands[0]
-                if threads > 1:
-                    operation.record(threads * CHUNKS_PER_THREAD)
-                    if len(operation.commands) > 1:
-                        self._chunks[id(operation)] = Shared(operation.commands)
-        self.team = Team(threads) if threads > 1 else None
+        frame.load()
+        self.team = Team(threads)
+        before, substep, after = (_steps(part, self.team, threads) for part in frame.parts)
+        self._parts = [(before, 1), (substep, frame.repeat), (after, 1)]
 
     def run(self) -> None:
-        self._run(self.frame.before)
-        for _ in range(self.frame.repeat):
-            self._run(self.frame.substep)
-        self._run(self.frame.after)
-
-    def _run(self, program: Program) -> None:
-        for operation in program.operations:
-            if isinstance(operation, Launch):
-                self._launch(operation)
-            elif isinstance(operation, Call):
-                operation.function()
-            elif self._flag(operation.flag)[0]:
-                self._run(operation.body)
-
-    def _flag(self, flag: wp.array) -> np.ndarray:
-        """The flag's memory itself: on the CPU a look needs no copy."""
-        if flag.ptr not in self._flags:
-            self._flags[flag.ptr] = flag.numpy()
-        return self._flags[flag.ptr]
-
-    def _launch(self, operation: Launch) -> None:
-        key = id(operation)
-        if self.team is not None and self._shared.get(key):
-            self.team.run(self._chunks[key])
-            return
-        start = time.perf_counter()
-        self._whole[key].launch()
-        if key in self._chunks and key not in self._shared:
-            self._shared[key] = time.perf_counter() - start > WORTH_SHARING
+        for steps, times in self._parts:
+            for _ in range(times):
+                for step in steps:
+                    step()
 
     def close(self) -> None:
         """End the worker threads."""
-        if self.team is not None:
-            self.team.close()
-            self.team = None
+        self.team.close()
+
+
+def _steps(program: Program, team: Team, threads: int) -> list[Callable[[], None]]:
+    """A program as functions to call in turn: launches without a gap are one of them."""
+    steps: list[Callable[[], None]] = []
+    for is_launch, group in itertools.groupby(
+        program.operations, lambda operation: isinstance(operation, Launch)
+    ):
+        operations = list(group)
+        if is_launch:
+            steps.append(_Run(operations, team, threads).run)
+            continue
+        for operation in operations:
+            if isinstance(operation, When):
+                steps.append(_If(operation.flag, _steps(operation.body, team, threads)).run)
+            else:
+                steps.append(operation.function)
+    return steps
+
+
+class _Run:
+    """Launches that follow one another. The first time they are timed, to be cut sensibly."""
+
+    def __init__(self, launches: list[Launch], team: Team, threads: int):
+        # Recorded now: nothing is to be compiled in the middle of a frame.
+        cuts = [1, *(threads * each for each in CHUNKS_PER_THREAD if threads > 1)]
+        self.choices = [[each.record(pieces) for pieces in cuts] for each in launches]
+        self.team = team
+        self.chain: Chain | None = None
+
+    def run(self) -> None:
+        if self.chain is not None:
+            self.team.run(self.chain)
+            return
+        stages = []
+        for whole, *cuts in self.choices:
+            start = time.perf_counter()
+            whole[0].launch()
+            seconds = time.perf_counter() - start
+            worth = [cut for cut in cuts if seconds > CHUNK_SECONDS * len(cut)]
+            stages.append(worth[-1] if worth else whole)
+        self.chain = Chain(stages)
+        self.choices.clear()
+
+
+class _If:
+    """A conditional part. On the CPU the flag is the memory itself: a look needs no copy."""
+
+    def __init__(self, flag: wp.array, steps: list[Callable[[], None]]):
+        self.flag, self.steps = flag.numpy(), steps
+
+    def run(self) -> None:
+        if self.flag[0]:
+            for step in self.steps:
+                step()
 
 
 AnyExecutor = GraphExecutor | EagerExecutor | ThreadExecutor

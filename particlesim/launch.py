@@ -32,16 +32,15 @@ class Launch:
     inputs: Sequence[Any]
     device: Any
     owner: str = ""
-    commands: list[Any] = field(default_factory=list)
 
     def issue(self) -> None:
         wp.launch(self.kernel, self.dim, [0, *self.inputs], device=self.device)
 
-    def record(self, chunks: int) -> None:
-        """Pack the arguments once: a chunk is the same launch from another first row."""
+    def record(self, chunks: int = 1) -> list[Any]:
+        """Commands with packed arguments: a chunk is the same launch from another first row."""
         pieces = max(1, min(chunks, self.dim // CHUNK))
         edges = [self.dim * k // pieces for k in range(pieces + 1)]
-        self.commands = [
+        return [
             wp.launch(
                 self.kernel,
                 stop - start,
@@ -167,4 +166,4 @@ class Frame:
         """Compile and load every kernel now rather than in the middle of a capture."""
         for part in self.parts:
             for operation in part.launches():
-                operation.record(1)
+                operation.record()

@@ -1,4 +1,4 @@
-"""A team of threads that share recorded launches (see :mod:`particlesim.kernels.team`).
+"""A team of threads that share chains of recorded launches (see :mod:`particlesim.kernels.team`).
 
 Between two shared launches lie tens of microseconds, and waking a thread that sleeps takes
 hundreds. So a worker looks for the next launch in native code for some milliseconds before it goes
@@ -10,46 +10,51 @@ from __future__ import annotations
 import ctypes
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import warp as wp
 
-from .kernels.team import COUNT, DONE, LEAVE, POSTS, RING, TABLE, serve_kernel, share_kernel
+from .kernels.team import LEAVE, LEFT, POSTS, RING, STAGE, serve_kernel, share_kernel
 
 # A worker looks for work for about five milliseconds. The caller, who waits for the workers, looks
 # for a shorter while and then lets others run: one of them may be the worker that it waits for.
 WORKER_LOOKS, CALLER_LOOKS = 10_000_000, 100_000
 
 
-class Shared:
-    """Commands packed for native code: entry point, bounds and arguments of each.
+class Chain:
+    """Launches packed for native code, one stage each: entry point, bounds and arguments.
 
     Args:
-        commands: ``wp.Launch`` commands on the CPU.
+        stages: ``wp.Launch`` commands on the CPU, a list for each stage: the chunks of a launch.
     """
 
-    def __init__(self, commands: Sequence[Any]):
-        self._kept = [_packed(command) for command in commands]  # what the table points to
-        self.table = np.array([addresses for addresses, _ in self._kept], dtype=np.uint64)
-        self.count = len(self.table)
+    def __init__(self, stages: Sequence[Sequence[Any]]):
+        self._kept = []  # what the tables point to
+        table = []
+        for commands in stages:
+            packed = [_packed(command) for command in commands]
+            chunks = np.array([addresses for addresses, _ in packed], dtype=np.uint64)
+            self._kept.append((packed, chunks))
+            table.append((chunks.ctypes.data, len(chunks)))
+        self.table = np.array(table, dtype=np.uint64)
 
 
 class Team:
     """The calling thread and ``threads - 1`` workers.
 
     Args:
-        threads: Threads in all, at least 2.
+        threads: Threads in all, at least 1.
     """
 
     def __init__(self, threads: int):
         self._board = _Board()
-        self._share = self._board.command(share_kernel(), CALLER_LOOKS, back=False)
+        self._share = self._board.action(share_kernel(), CALLER_LOOKS, back=False)
         # Recorded here: Warp compiles on one thread. The workers know the board only, so that the
         # team can be let go.
         serves = [
-            self._board.command(serve_kernel(), WORKER_LOOKS, back=index % 2 == 0)
+            self._board.action(serve_kernel(), WORKER_LOOKS, back=index % 2 == 0)
             for index in range(threads - 1)
         ]
         self.workers = [
@@ -59,14 +64,21 @@ class Team:
         for worker in self.workers:
             worker.start()
 
-    def run(self, shared: Shared) -> None:
-        """Run all commands, each by whoever is free, and return when all are done."""
-        board = self._board
-        board.post(shared)
-        self._share.launch()
-        while board.words[DONE] < shared.count:
+    def run(self, chain: Chain) -> None:
+        """Run all stages in turn, each by whoever is free, and return when all are done."""
+        self._board.offer(chain)
+        try:
+            self._finish()
+        except BaseException:  # an interrupt: no chunk may be under way when the next chain comes
+            self._finish()
+            raise
+
+    def _finish(self) -> None:
+        words, share = self._board.words, self._share
+        share()
+        while words[LEFT]:
             time.sleep(0)
-            self._share.launch()
+            share()
 
     def close(self) -> None:
         """Send the workers home."""
@@ -86,15 +98,22 @@ class _Board:
         self.asleep = 0
         self.awake = threading.Condition()
 
-    def command(self, kernel: Any, looks: int, back: bool) -> Any:
-        """A recorded launch of one of the team's kernels; chunks are taken from front or back."""
+    def action(self, kernel: Any, looks: int, back: bool) -> Callable[[], None]:
+        """One of the team's kernels as a function; chunks are taken from front or back."""
         inputs = [0, self.memory, looks, int(back)]
-        return wp.launch(kernel, 1, inputs, device="cpu", record_cmd=True)
+        command = wp.launch(kernel, 1, inputs, device="cpu", record_cmd=True)
+        (entry, bounds, arguments), kept = _packed(command)
+        call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(entry)
 
-    def post(self, shared: Shared) -> None:
-        """Offer the commands; nothing of an earlier post is still under way."""
+        def act(_kept: Any = kept) -> None:
+            call(bounds, arguments)
+
+        return act
+
+    def offer(self, chain: Chain) -> None:
+        """Lay out the stages; nothing of an earlier chain is still under way."""
         self.posts += 1
-        self.words[TABLE], self.words[COUNT] = shared.table.ctypes.data, shared.count
+        self.words[STAGE], self.words[LEFT] = chain.table.ctypes.data, len(chain.table)
         if self.asleep:
             with self.awake:
                 self.awake.notify_all()
@@ -106,9 +125,9 @@ class _Board:
             self.awake.notify_all()
 
 
-def _work(board: _Board, serve: Any) -> None:
+def _work(board: _Board, serve: Callable[[], None]) -> None:
     while not board.words[LEAVE]:
-        serve.launch()
+        serve()
         with board.awake:
             seen = board.posts
             board.asleep += 1

@@ -106,11 +106,16 @@ class VerletList(AllPairs):
         for axis, on in enumerate(model.periodic):
             if on:
                 scale[axis] = cells[axis] / model.box_length[w, axis]
-        grid = wp.HashGrid(*(int(c) for c in cells), device=model.device, dtype=self._real)
+        axes, backward = _slowest_last(x)
+        turn = np.zeros((3, 3))
+        turn[range(3), axes] = np.where(backward, -scale, scale)[axes]
+        dimensions = (int(c) for c in cells[axes])
+        grid = wp.HashGrid(*dimensions, device=model.device, dtype=self._real)
         grid.reserve(len(x))
         place = kernels.cells_type(model.precision)()
-        place.origin = model.precision.vec3(*lower)
-        place.scale = model.precision.vec3(*scale)
+        # Backward from a whole number of cells on, so that a periodic axis wraps at its ends.
+        place.origin = model.precision.vec3(*np.where(backward, lower + cells / scale, lower))
+        place.turn = model.precision.mat33(turn)
         place.first, place.world = int(self.begin_host[w]), w
         return grid, place
 
@@ -257,3 +262,16 @@ class VerletList(AllPairs):
         count = min(int(self.pairs.count.numpy()[slot]), self.capacity)
         at = slot * self.pairs.row_stride + np.arange(count) * self.pairs.entry_stride
         return order[self.index.numpy()[at]]
+
+
+def _slowest_last(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Axes by how far particles in their own order advance along them, and which go backward.
+
+    A grid numbers its cells by the last axis first. Where that is the order of the particles too,
+    what a thread writes by particle it reads by slot: two threads ran SPH 2.05 instead of 1.7 times
+    as fast as one.
+    """
+    index = np.arange(len(x)) - 0.5 * (len(x) - 1)
+    spread = np.maximum(x.std(axis=0), np.finfo(float).tiny)
+    trend = index @ (x - x.mean(axis=0)) / spread
+    return np.argsort(np.abs(trend), kind="stable"), trend < 0

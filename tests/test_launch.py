@@ -11,7 +11,7 @@ import particlesim as ps
 from particlesim import launch
 from particlesim.executors import EagerExecutor, GraphExecutor, ThreadExecutor
 from particlesim.launch import CHUNK, Frame, Launch, Program, When
-from particlesim.threads import Shared, Team
+from particlesim.threads import Chain, Team
 
 WAYS = [("graph", None), ("threads", 1), ("threads", 2), ("threads", 3), ("auto", 2)]
 
@@ -127,13 +127,19 @@ def add_one(first: int, values: wp.array(dtype=float)):
     values[i] = values[i] + 1.0
 
 
+@wp.kernel
+def twice(first: int, values: wp.array(dtype=float)):
+    i = first + wp.tid()
+    values[i] = 2.0 * values[i]
+
+
 def test_a_launch_is_cut_into_chunks_that_cover_it():
     for count in (1, CHUNK, 3 * CHUNK + 5):
         values = wp.zeros(count, dtype=float, device="cpu")
         operation = Launch(add_one, count, [values], values.device)
-        operation.record(8)
-        assert len(operation.commands) == max(1, min(8, count // CHUNK))
-        for command in operation.commands:
+        commands = operation.record(8)
+        assert len(commands) == max(1, min(8, count // CHUNK))
+        for command in commands:
             command.launch()
         assert (values.numpy() == 1).all()
 
@@ -178,18 +184,23 @@ def test_a_condition_is_read_when_its_turn_comes():
     assert (values.numpy() == 1).all()
 
 
-@pytest.mark.parametrize("threads", [2, 5])  # five: more than this machine may have cores
-def test_a_team_runs_every_chunk_once(threads):
+@pytest.mark.parametrize("threads", [1, 2, 5])  # five: more than this machine may have cores
+def test_a_team_runs_every_chunk_once_and_every_stage_in_its_turn(threads):
     values = wp.zeros(8 * CHUNK, dtype=float, device="cpu")
-    operation = Launch(add_one, len(values), [values], values.device)
-    operation.record(8)
-    shared, team = Shared(operation.commands), Team(threads)
-    assert shared.count == 8
+    cut, double = (
+        Launch(kernel, len(values), [values], values.device) for kernel in (add_one, twice)
+    )
+    chain = Chain([cut.record(8), double.record(5), cut.record()])
+    team = Team(threads)
+    assert chain.table[:, 1].tolist() == [8, 5, 1]
     for run in range(1, 301):
-        team.run(shared)
+        team.run(chain)
+        # x -> 2 (x + 1) + 1; started from zero again before it leaves the whole numbers of float32.
+        assert (values.numpy() == 3 * (2.0 ** (1 + (run - 1) % 20) - 1)).all()
+        if run % 20 == 0:
+            values.zero_()
         if run % 100 == 0:  # the workers fall asleep in between
             time.sleep(0.02)
-            assert (values.numpy() == run).all()
     team.close()
     for worker in team.workers:
         worker.join(5)
