@@ -100,6 +100,7 @@ class VerletList(AllPairs):
                 length = model.box_length[w, axis]
                 cells[axis] = np.clip(np.floor(length / (1.001 * reach)), 1, MAX_CELLS)
                 lower[axis] = model.box_lower[w, axis]
+                upper[axis] = lower[axis] + length
         budget = max(4096, CELLS_PER_PARTICLE * len(x))
         while np.prod(cells) > budget:
             cells[np.argmax(cells)] = np.ceil(cells.max() / 2)
@@ -113,8 +114,7 @@ class VerletList(AllPairs):
         grid = wp.HashGrid(*dimensions, device=model.device, dtype=self._real)
         grid.reserve(len(x))
         place = kernels.cells_type(model.precision)()
-        # Backward from a whole number of cells on, so that a periodic axis wraps at its ends.
-        place.origin = model.precision.vec3(*np.where(backward, lower + cells / scale, lower))
+        place.origin = model.precision.vec3(*np.where(backward, upper, lower))
         place.turn = model.precision.mat33(turn)
         place.first, place.world = int(self.begin_host[w]), w
         return grid, place

@@ -204,3 +204,18 @@ def test_hardly_any_particles(count, device):
     sim.step()
     assert sim.position.shape == (count, 3)
     assert sim.diagnostics().energy.shape == (1,)
+
+
+@pytest.mark.parametrize("axes", [(0, 1, 2), (2, 0, 1), (1, 2, 0)])
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_slots_follow_the_order_of_the_particles(axes, direction, wrapped):
+    # Layers of 8 x 8, one cell thick: a slot is in the layer of the particle of that number, so
+    # both numberings part by less than a layer, while another order of the axes mixes all layers.
+    x = (np.indices((20, 8, 8)).reshape(3, -1).T + 0.5)[:, axes][::direction]
+    side = np.array((20, 8, 8))[list(axes)]
+    scene = ps.Scene(periodic=((0, 0, 0), side) if wrapped else None)
+    scene.add_particles(x)
+    sim = check([scene], ps.Settings(skin=0.05), "cpu", 0.94)
+    order = sim.neighbors.lists[0].order.numpy()
+    assert np.abs(order - np.arange(len(x))).max() < 64
