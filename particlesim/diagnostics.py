@@ -40,8 +40,13 @@ class Diagnostics:
         return self.kinetic + self.potential
 
 
-def measure(sim: Simulation) -> Diagnostics:
-    """The diagnostics of the simulation's present state."""
+def measure(sim: Simulation, potentials: list[np.ndarray] | None = None) -> Diagnostics:
+    """The diagnostics of the simulation's present state.
+
+    Args:
+        sim: The simulation.
+        potentials: If given, gets the potential energy of each interaction, (worlds,).
+    """
     model, state, device = sim.model, sim.state, sim.model.device
     state.require({"mass", "inverse_mass"})
     energy = wp.zeros(model.particle_count, dtype=wp.float64, device=device)
@@ -49,7 +54,11 @@ def measure(sim: Simulation) -> Diagnostics:
     sim.neighbors.update(state)
     sim.neighbors.grow()
     for interaction in sim.interactions:
+        before = energy.numpy().copy() if potentials is not None else None
         interaction.measure(state, energy, virial)
+        if potentials is not None:
+            own = energy.numpy() - before
+            potentials.append(np.bincount(model.world_of, own, model.world_count))
     begin, end, world = blocks(model.offsets)
     sums = wp.zeros((len(begin), QUANTITIES), dtype=wp.float64, device=device)
     launch(
@@ -68,12 +77,12 @@ def measure(sim: Simulation) -> Diagnostics:
     )
 
 
-def blocks(offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def blocks(offsets: np.ndarray, size: int = BLOCK) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Begin, end and world of the blocks; they start anew in each world."""
     begin, end, world = [], [], []
     for w, (start, stop) in enumerate(itertools.pairwise(offsets)):
-        edges = np.arange(start, stop, BLOCK)
+        edges = np.arange(start, stop, size)
         begin.append(edges)
-        end.append(np.minimum(edges + BLOCK, stop))
+        end.append(np.minimum(edges + size, stop))
         world.append(np.full(len(edges), w))
     return np.concatenate(begin), np.concatenate(end), np.concatenate(world)

@@ -1,45 +1,82 @@
-"""Recording a simulation into USD: what of it is drawn, and how."""
+"""Recording a simulation into USD, frame by frame."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from . import validate
 from .usd import UsdWriter
-from .usd_info import LinksPrim, PointsPrim, Shape, StageInfo
+from .usd_drawing import Drawing
+from .usd_fields import ParticleColors, ParticleFields
 
 if TYPE_CHECKING:
     from .simulation import Simulation
 
-PLAYBACK_FPS = 24.0  # where a frame is not a sensible part of a second
-FPS_RANGE = (1.0, 1000.0)
-LINK_WIDTH = 0.5  # of the mean particle diameter
-LINK_COLOR = (0.75, 0.72, 0.65)
+
+@dataclass(frozen=True, eq=False)
+class FrameData:
+    """All that is written of one frame, on the host (see :meth:`UsdRecorder.capture`).
+
+    ``changing`` are the further arguments of :meth:`particlesim.usd.UsdWriter.write`.
+    """
+
+    number: int
+    position: np.ndarray
+    velocity: np.ndarray
+    fields: dict[str, np.ndarray]
+    changing: dict[str, Any] = field(default_factory=dict)
 
 
 class UsdRecorder:
     """Records the frames of a simulation into a USD file, each safe as soon as it is written.
 
+    Groups are drawn as points; those that were given triangles as meshes with normals. Pairs of
+    constraints and springs are drawn as curves, unless both ends are in one mesh, and until they
+    break. Boundaries are meshes, and have a transform in every frame where they move.
+
     Args:
         sim: The simulation.
         path: The root file, ``.usda``, ``.usd`` or ``.usdc``; frames go to ``<stem>.clips``.
-        frames: How many more frames are planned; more or fewer may come.
-        fields: Names of further per-particle arrays to write as primvars (``"density"``).
-        fps: Frames a second of playback; None: 1 / dt where that is sensible, else 24.
+        frames: How many more frames of the simulation are planned; more or fewer may come.
+        fields: Names of further values to write as primvars: arrays of the state (``"density"``,
+            ``"force"``), attributes of the particles, ``"speed"``; in the simulation's units.
+        fps: Frames a second of playback; None: in real time where that is sensible, else 24.
         overwrite: Replace an existing recording.
+        worlds: Which worlds to record, by number; None: all.
+        groups: Which groups, by name or themselves; None: all.
+        layout: None leaves the worlds where they are; ``"grid"`` puts them side by side on the
+            ground; (3,) is the way from each to the next [length]. It becomes the transform of
+            ``/World/env_####``: points keep their positions.
+        every: Record every k-th frame of the simulation, those whose number k divides. Time codes
+            still count one by one: code c is the simulation's frame k c, and playback keeps its
+            speed with 1/k of the frames a second.
+        color_by: Colour particles by a value, any name that ``fields`` takes; vectors by their
+            length. None: each group has its own colour, as surfaces of fluids always have.
+        color_map: ``"viridis"``, ``"magma"``, ``"cubehelix"``, ``"coolwarm"``, ``"gray"``, or
+            colours (k, 3), linear.
+        color_range: (lower, upper) numbers with the first and the last colour; None: the least
+            and the greatest in the first frame in which particles differ.
+        instancer: Draw groups as a PointInstancer of spheres. Files are larger, and Blender shows
+            no colours of instances.
+        surface: Draw the fluid of each SPH as one mesh a frame, its surface, and leave its
+            particles out; options of :class:`~particlesim.surface.Surface`, or True for none.
+        resume: Go on after the recorded frame of this number; those after it are replaced.
 
     Raises:
-        FileExistsError, FileNotFoundError, ValueError: As :class:`~particlesim.usd.UsdWriter`.
+        FileExistsError, FileNotFoundError, ValueError: As :class:`~particlesim.usd.UsdWriter`, and
+            names of worlds, groups, fields and colour maps that are not there.
 
     Example:
         >>> from particlesim import Scene, Simulation
         >>> scene = Scene()
         >>> ball = scene.add_particles([(0, 1, 0)], velocity=(1, 0, 0), radius=0.1)
         >>> sim = Simulation(scene, device="cpu")
-        >>> with UsdRecorder(sim, "ball.usda", frames=1) as recorder:
+        >>> with UsdRecorder(sim, "ball.usda", frames=1, color_by="speed") as recorder:
         ...     recorder.write()
         ...     sim.step()
         ...     recorder.write()
@@ -54,21 +91,71 @@ class UsdRecorder:
         fields: Iterable[str] = (),
         fps: float | None = None,
         overwrite: bool = False,
+        worlds: Iterable[int] | None = None,
+        groups: Iterable[Any] | None = None,
+        layout: Any = None,
+        every: int = 1,
+        color_by: str | None = None,
+        color_map: Any = "viridis",
+        color_range: tuple[float, float] | None = None,
+        instancer: bool = False,
+        surface: bool | Mapping[str, Any] = False,
+        resume: int | None = None,
     ):
         self.sim = sim
-        self.fields = tuple(fields)
-        widths = {name: 3 if sim.state[name].dtype.__name__.startswith("vec") else 1
-                  for name in self.fields}  # fmt: skip
+        self.every = validate.whole("UsdRecorder", "every", every, minimum=1)
+        validate.whole("UsdRecorder", "frames", frames)
+        first, last = -(-sim.frame // self.every), (sim.frame + frames) // self.every
+        self.drawing = Drawing(
+            sim, frames=max(1, last - first + 1), frame_time=self.every * sim.settings.dt, fps=fps,
+            worlds=worlds, groups=groups, layout=layout, instancer=instancer,
+            surface=surface,
+        )  # fmt: skip
+        self.fields = ParticleFields(sim, fields)
+        kinds = {name: self.fields.kind(name) for name in self.fields.names}
+        self.colors: ParticleColors | None = None
+        if color_by is not None:
+            rows = self.drawing.rows
+            self.colors = ParticleColors(sim, color_by, color_map, color_range, rows)
+            kinds["displayColor"] = "color"
         self.writer = UsdWriter(
-            path, stage_info(sim, frames, fps), fields=widths, overwrite=overwrite
+            path, self.drawing.info, fields=kinds, overwrite=overwrite, resume=resume
         )
+        if self.colors is not None:
+            self.colors.restore(self.writer.notes)
 
     def write(self) -> None:
-        """Write the simulation's present state as its present frame."""
+        """Write the simulation's present state as its present frame, if that is to be recorded."""
+        self.write_frame(self.capture())
+
+    def capture(self) -> FrameData | None:
+        """Copy to the host all that the present frame needs, and touch no file.
+
+        What it returns shares nothing with the simulation: another thread may write it while the
+        simulation goes on. None: ``every`` leaves this frame out.
+        """
         sim = self.sim
-        self.writer.write(
-            sim.frame, sim.position, sim.velocity, {name: sim.get(name) for name in self.fields}
-        )
+        if sim.frame % self.every:
+            return None
+        fields = self.fields.read()
+        drawing = self.drawing
+        changing: dict[str, Any] = {
+            "pairs": drawing.pairs(),
+            "meshes": drawing.meshes(),
+            "poses": drawing.poses(),
+        }
+        if self.colors is not None:
+            fields["displayColor"] = self.colors.read()
+            changing["notes"] = self.colors.notes()
+        number = sim.frame // self.every
+        return FrameData(number, sim.position, sim.velocity, fields, changing)
+
+    def write_frame(self, frame: FrameData | None) -> None:
+        """Write what :meth:`capture` returned; touches no simulation."""
+        if frame is not None:
+            self.writer.write(
+                frame.number, frame.position, frame.velocity, frame.fields, **frame.changing
+            )
 
     def close(self) -> None:
         """Give the file the end that was reached."""
@@ -79,95 +166,3 @@ class UsdRecorder:
 
     def __exit__(self, *error: Any) -> None:
         self.writer.__exit__(*error)
-
-
-def stage_info(sim: Simulation, frames: int, fps: float | None) -> StageInfo:
-    """What the recording of a simulation holds."""
-    dt, first = sim.settings.dt, sim.scenes[0]
-    if fps is None:
-        natural = 1.0 / dt if dt > 0 else 0.0
-        fps = natural if FPS_RANGE[0] <= natural <= FPS_RANGE[1] else PLAYBACK_FPS
-        fps = round(fps) if abs(fps - round(fps)) < 1e-6 else fps
-    return StageInfo(
-        points=_points(sim),
-        links=_links(sim),
-        shapes=_shapes(sim),
-        frames=frames + 1,
-        fps=fps,
-        frame_time=dt if dt > 0 else None,
-        up_axis=first.up_axis,
-        meters_per_unit=first.meters_per_unit,
-        periodic=_periodic(sim),
-    )
-
-
-def _points(sim: Simulation) -> list[PointsPrim]:
-    points = []
-    for w, scene in enumerate(sim.scenes):
-        offset = int(sim.model.offsets[w])
-        for group in scene.groups:
-            if not len(group):
-                continue
-            diameter = 2.0 * scene.radius[group.slice]
-            width: np.ndarray | float | None = diameter if diameter.any() else None
-            if width is not None and np.ptp(diameter) == 0:
-                width = float(diameter[0])
-            points.append(
-                PointsPrim(
-                    w, group.name, slice(offset + group.start, offset + group.stop),
-                    group.indices, width, group.color,
-                )
-            )  # fmt: skip
-    return points
-
-
-def _links(sim: Simulation) -> list[LinksPrim]:
-    links = []
-    for part in [*sim.interactions, *sim.constraints]:
-        for w, peer in enumerate(part.peers):
-            pairs = peer.links()
-            if len(pairs):
-                radius = sim.scenes[w].radius
-                mean = float(radius[np.unique(pairs)].mean()) or _size(sim.scenes[w].position)
-                offset = int(sim.model.offsets[w])
-                links.append(
-                    LinksPrim(w, part.name, pairs + offset, 2 * LINK_WIDTH * mean, LINK_COLOR)
-                )
-    return links
-
-
-def _size(position: np.ndarray) -> float:
-    """A visible radius for scenes whose particles have none."""
-    return 0.005 * float(np.linalg.norm(np.ptp(position, axis=0))) or 0.01
-
-
-def _shapes(sim: Simulation) -> list[Shape]:
-    shapes = []
-    for part in sim.constraints:
-        for w, peer in enumerate(part.peers):
-            for each in peer.shapes():
-                described = {
-                    key: _drawable(key, value, sim.scenes[w].position)
-                    for key, value in each.items()
-                }
-                make = getattr(Shape, described.pop("kind"))
-                shapes.append(make(world=w, name=part.name, **described))
-    return shapes
-
-
-def _periodic(sim: Simulation) -> tuple[np.ndarray, np.ndarray] | None:
-    """The box, where all worlds have the same."""
-    length, lower = sim.model.box_length, sim.model.box_lower
-    if not sim.model.periodic or np.ptp(length, axis=0).any() or np.ptp(lower, axis=0).any():
-        return None
-    on = length[0] > 0
-    return np.where(on, lower[0], np.nan), np.where(on, lower[0] + length[0], np.nan)
-
-
-def _drawable(name: str, value: Any, position: np.ndarray) -> Any:
-    """Open sides of a box end where the particles start."""
-    if name not in ("lower", "upper"):
-        return value
-    corner = np.asarray(value, dtype=float)
-    reached = position.min(axis=0) if name == "lower" else position.max(axis=0)
-    return np.where(np.isfinite(corner), corner, reached)

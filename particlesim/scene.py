@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import validate
+from .bounds import corners
 
 if TYPE_CHECKING:
     from .constraints.base import ConstraintBase
@@ -29,12 +30,21 @@ class Group:
     """A run of particles of a scene, made by one ``add_particles``.
 
     ``group[k]`` is the index in the scene of the group's k-th particle; slices and arrays give
-    arrays of indices, ready for pairs and constraints.
+    arrays of indices, ready for pairs and constraints. ``triangles`` (t, 3) int, counted within the
+    group, is the surface that it is drawn as; None: it is drawn as points.
     """
 
-    def __init__(self, scene: Scene, name: str, start: int, stop: int, color: Color):
+    def __init__(
+        self,
+        scene: Scene,
+        name: str,
+        start: int,
+        stop: int,
+        color: Color,
+        triangles: np.ndarray | None = None,
+    ):
         self.scene, self.name, self.start, self.stop = scene, name, start, stop
-        self.color = color
+        self.color, self.triangles = color, triangles
 
     def __len__(self) -> int:
         return self.stop - self.start
@@ -68,6 +78,8 @@ class Scene:
         meters_per_unit: Length of one unit [m], for exports.
         periodic: ``(lower, upper)`` corners of a periodic box; None on an axis leaves it open:
             ``((0, None, 0), (1, None, 1))``. None: open everywhere.
+        bounds: ``(lower, upper)`` corners of what no particle may leave, each side open where it is
+            None; the watchdog reports who does (see Settings). They hold nothing: boundaries do.
 
     Example:
         >>> scene = Scene()
@@ -81,12 +93,14 @@ class Scene:
         up_axis: str = "y",
         meters_per_unit: float = 1.0,
         periodic: tuple[Sequence[float | None], Sequence[float | None]] | None = None,
+        bounds: tuple[Sequence[float | None], Sequence[float | None]] | None = None,
     ):
         self.up_axis = validate.choice("Scene", "up_axis", up_axis, ("x", "y", "z"))
         self.meters_per_unit = validate.number(
             "Scene", "meters_per_unit", meters_per_unit, above=0.0, unit="m"
         )
         self.periodic = _box(periodic)
+        self.bounds = corners(bounds)
         self.groups: list[Group] = []
         self.interactions: list[Interaction] = []
         self.constraints: list[ConstraintBase] = []
@@ -104,6 +118,7 @@ class Scene:
         group: str | None = None,
         pinned: Any = False,
         color: Sequence[float] | None = None,
+        triangles: Any = None,
         **attributes: Any,
     ) -> Group:
         """Add particles and return them as a :class:`Group`.
@@ -117,12 +132,14 @@ class Scene:
             pinned: One for all, or (n,) bool; a pinned particle has infinite mass for forces
                 and constraints and keeps its velocity.
             color: (r, g, b) in 0..1, for exports.
+            triangles: (t, 3) int into these particles, counterclockwise from outside: exports draw
+                the group as this surface.
             **attributes: Further per-particle values, (n,) or (n, 3), that laws may name
                 (``charge=...``). Groups added without one have zeros.
 
         Raises:
             ValueError: Wrong shapes, values that are not finite, masses or radii out of range,
-                a name used twice.
+                a name used twice, triangles of other particles.
         """
         owner = "Scene.add_particles"
         x = validate.rows(owner, "position", position, None, 3)
@@ -130,6 +147,7 @@ class Scene:
         name = f"group_{len(self.groups)}" if group is None else str(group)
         if any(name == other.name for other in self.groups):
             raise validate.fail(owner, "group", "be a new name", name, "choose another")
+        surface = None if triangles is None else validate.triangles(owner, triangles, count)
         columns: dict[str, np.ndarray] = {
             "position": x,
             "velocity": validate.rows(owner, "velocity", velocity, count, 3),
@@ -159,7 +177,8 @@ class Scene:
             _bounded(owner, "color", rgb, (rgb >= 0) & (rgb <= 1), "from 0 to 1", "scale it")
             red, green, blue = rgb
             chosen = (float(red), float(green), float(blue))
-        result = Group(self, name, self.particle_count, self.particle_count + count, chosen)
+        start = self.particle_count
+        result = Group(self, name, start, start + count, chosen, surface)
         self.groups.append(result)
         self.particle_count += count
         return result

@@ -7,7 +7,7 @@ Memory does not grow with the number of frames.
 
 What is recorded is described on the host (:mod:`particlesim.usd_info`), so that any source of
 arrays can be recorded (:mod:`particlesim.record` does it for simulations). How the root looks
-inside is :mod:`particlesim.usd_stage`.
+inside is :mod:`particlesim.usd_stage`, what clips hold :mod:`particlesim.usd_clips`.
 """
 
 from __future__ import annotations
@@ -19,18 +19,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import numpy as np
 from pxr import Sdf, Tf
 
-from . import usd_stage, validate
-from .usd_info import StageInfo
+from . import usd_clips, usd_stage, validate
+from .usd_frame import Frame, FrameChecker, field_kinds
+from .usd_info import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
+from .usd_resume import take_up
 
 SUFFIXES = (".usda", ".usd", ".usdc")
-# Readers take these names to mean something else than a value of the particle.
-TAKEN_FIELDS = frozenset(
-    "points position velocities velocity accelerations normals widths radius ids pid "
-    "displayColor displayOpacity st".split()
-)
 
 
 class UsdWriter:
@@ -42,21 +38,35 @@ class UsdWriter:
     Args:
         path: The root file, ``.usda``, ``.usd`` or ``.usdc``; frames go to ``<stem>.clips`` beside.
         info: What to record.
-        fields: Further values a particle to :meth:`write`, name to 1 (float) or 3 (float3).
-            Their primvars have the same names, made valid.
+        fields: Further values a particle to :meth:`write`, name to kind: 1 (float), 3 (float3),
+            ``"int"`` or ``"color"`` (color3f). Their primvars have the same names, made valid.
+            ``displayColor`` (a colour, linear) and ``widths`` (1, diameters) take the place of
+            what the description has for a whole group.
         overwrite: Replace an existing recording.
+        resume: Go on after this frame of an existing recording: the first of :meth:`write` is the
+            next. Later frames that are there are replaced, one by one.
 
     Raises:
         FileExistsError: The output exists, and ``overwrite`` is not set.
         FileNotFoundError: The parent folder does not exist.
-        ValueError: Another suffix, a field with a name that is taken or other than 1 or 3 numbers.
+        ValueError: Another suffix, a field with a name that is taken or of another kind, a
+            recording to be resumed that is of something else.
 
     Example:
         >>> from particlesim.usd_info import PointsPrim
         >>> drops = PointsPrim(0, "drops", slice(0, 2), np.arange(2), 0.1, (0.2, 0.5, 0.9))
-        >>> with UsdWriter("drops.usda", StageInfo(points=[drops], frames=2, fps=24)) as recorder:
+        >>> with UsdWriter("drops.usda", StageInfo(points=[drops], frames=2, fps=24)) as writer:
         ...     for frame in range(2):
-        ...         recorder.write(frame, np.full((2, 3), frame / 24), np.ones((2, 3)))
+        ...         writer.write(frame, np.full((2, 3), frame / 24), np.ones((2, 3)))
+
+        Rows, pairs and triangles that a description leaves open come with every frame:
+
+        >>> spray = PointsPrim(0, "spray", None, None, 0.1, (0.2, 0.5, 0.9))
+        >>> with UsdWriter("spray.usda", StageInfo(points=[spray], frames=2, fps=24)) as writer:
+        ...     for frame in range(2):
+        ...         alive = np.arange(frame, 2)
+        ...         x = np.full((2, 3), frame / 24)
+        ...         writer.write(frame, x, np.ones((2, 3)), rows={spray: (alive, alive)})
     """
 
     def __init__(
@@ -64,23 +74,26 @@ class UsdWriter:
         path: str | os.PathLike[str],
         info: StageInfo,
         *,
-        fields: Mapping[str, int] | None = None,
+        fields: Mapping[str, int | str] | None = None,
         overwrite: bool = False,
+        resume: int | None = None,
     ):
         self.path = Path(path)
         self.clips = self.path.with_suffix(".clips")
         self.info = info
-        self.fields = _field_names(dict(fields or {}))
-        self.overwrite = overwrite
+        self.fields = field_kinds(fields or {})
+        self.overwrite = overwrite or resume is not None
         self._refuse_unusable()
-        self._layout = usd_stage.layout(info)
-        used = [prim.rows for prim in info.points] + [prim.pairs for prim in info.links]
-        self._row_count = 1 + max(int(rows.max()) for rows in used)
+        self._layout = usd_clips.layout(info)
+        self._checker = FrameChecker(info, self._layout.points, self.fields)
         self._root: Sdf.Layer | None = None
         self._clip: Sdf.Layer | None = None
-        self._frame: int | None = None  # the last one written
+        self._frame = resume  # the last one written
         self._planned_end = 0
         self._closed = False
+        self.notes: dict[str, Any] = {}  # of the frame to go on from
+        if resume is not None:
+            self._go_on(resume)
 
     def write(
         self,
@@ -88,17 +101,29 @@ class UsdWriter:
         position: Any,
         velocity: Any,
         fields: Mapping[str, Any] | None = None,
+        *,
+        rows: Mapping[PointsPrim, tuple[Any, Any]] | None = None,
+        pairs: Mapping[LinksPrim, Any] | None = None,
+        meshes: Mapping[MeshPrim, tuple[Any, Any, Any]] | None = None,
+        poses: Mapping[Shape, tuple[Any, Any]] | None = None,
+        notes: Mapping[str, Any] | None = None,
     ) -> None:
         """Write one frame. When it returns, the frame is in its file, whole.
 
         Args:
             frame: Its time code. The first may be any (0 is the start state), then one by one.
-            position: (n, 3) [length], NumPy or Warp.
+            position: (n, 3) [length], NumPy or Warp; n may be another in every frame.
             velocity: (n, 3) [length per simulated time].
-            fields: (n,) or (n, 3) for every name the recorder was made with.
+            fields: (n,) or (n, 3) for every name the writer was made with.
+            rows: Of every group without indices: its rows (k,) int, and their ids (k,) int.
+            pairs: Of all links without pairs: theirs, (m, 2) int rows.
+            meshes: Of every surface without indices: points (p, 3) [length], triangles (t, 3) int
+                into them, counterclockwise from outside, and normals (p, 3).
+            poses: Of every moving shape: translation (3,) [length] and rotation (3, 3).
+            notes: Words and numbers to keep in the frame's file, as layer data ``particlesim``.
 
         Raises:
-            ValueError: A frame out of order, arrays of other shapes, fields that are missing, or a
+            ValueError: A frame out of order, arrays of other shapes, values that are missing, or a
                 value that is not finite (in single precision); the message names frame and
                 particle. OSError: The file could not be written. Frames before are kept.
         """
@@ -112,30 +137,22 @@ class UsdWriter:
             raise validate.fail(
                 owner, "frame", f"be {self._frame + 1}, the next", frame, "leave no frame out"
             )
-        given = dict(fields or {})
-        if given.keys() != self.fields.keys():
-            raise validate.fail(
-                owner, "fields", f"be {sorted(self.fields)}", sorted(given), "give just these"
-            )
-        x = self._checked("position", position, 3, frame)
-        v = self._checked("velocity", velocity, 3, frame, self.info.velocity_scale)
-        values = {
-            usd_stage.primvar(name): self._checked(name, given[name], width, frame)
-            for name, width in self.fields.items()
-        }
+        checked = self._checker.frame(
+            frame, position, velocity, fields, rows, pairs, meshes, poses, notes
+        )
         if self._clip is None:
-            self._begin(frame, x)
+            self._begin(checked)
         if frame > self._planned_end:
             # Twice as far, so that long unplanned runs rewrite the root a few times only.
             self._publish_root(2 * frame)
-        usd_stage.fill_clip(self._clip, self._layout, self.info, frame, x, v, values)
+        usd_clips.fill_clip(self._clip, self._layout, self.info, checked)
         _publish(self._clip, self.clips / f"f.{frame:06d}.usdc")
         self._frame = frame
 
     def close(self) -> None:
         """Give the root the end that was reached. May be called again."""
         if self._root is not None and not self._closed and self._frame != self._planned_end:
-            self._publish_root(self._first if self._frame is None else self._frame)
+            self._publish_root(self.first if self._frame is None else self._frame)
         self._closed = True
 
     def __enter__(self) -> Self:
@@ -179,7 +196,7 @@ class UsdWriter:
                     "choose another, or pass overwrite=True."
                 )
 
-    def _begin(self, frame: int, x: np.ndarray) -> None:
+    def _begin(self, frame: Frame) -> None:
         """Everything that has to be on disk before the first frame."""
         self._refuse_unusable()
         self.overwrite = True  # from here on, what exists is this recording's own
@@ -188,50 +205,36 @@ class UsdWriter:
         self.clips.mkdir(exist_ok=True)
         for stale in [*self.clips.glob("f.*.usdc"), *self.clips.glob("manifest.*usda")]:
             stale.unlink()
-        self.info = usd_stage.sized(self.info, x)
-        manifest = usd_stage.manifest(self._layout, self.fields, self.info)
+        clouds = [frame.x[rows] for rows, _ in frame.clouds]
+        self.info = usd_stage.sized(self.info, clouds)
+        manifest = usd_clips.manifest(self._layout, self.fields, self.info)
         _publish(manifest, self.clips / "manifest.usda")
-        self._first = frame
-        self._root = usd_stage.author_root(self._layout, self.info, self.fields, x)
-        self._publish_root(frame + self.info.frames - 1)
-        clip = Sdf.Layer.CreateAnonymous(".usdc")
-        clip.TransferContent(manifest)
-        self._clip = clip
+        self.first = frame.number
+        self._root = usd_stage.author_root(self._layout, self.info, self.fields, frame)
+        self._publish_root(frame.number + self.info.frames - 1)
+        self._clip = _mould(manifest)
+
+    def _go_on(self, last: int) -> None:
+        """Take up what is on disk."""
+        found = take_up(self.path, self.clips, self._layout, self.info, self.fields, last)
+        planned = last + self.info.frames - 1
+        self.info, self.first, self.notes = found.info, found.first, found.notes
+        self._root, self._clip = found.root, _mould(found.manifest)
+        self._planned_end = found.end
+        if planned > found.end:
+            self._publish_root(planned)
 
     def _publish_root(self, end: int) -> None:
-        usd_stage.set_frames(self._root, self.clips.name, self._first, end)
+        usd_stage.set_frames(self._root, self.clips.name, self.first, end)
         _publish(self._root, self.path)
         self._planned_end = end
 
-    def _checked(
-        self, name: str, given: Any, width: int, frame: int, scale: float = 1.0
-    ) -> np.ndarray:
-        """Single precision, (n, 3) or (n,), finite."""
-        owner = "UsdRecorder.write"
-        array = np.asarray(given.numpy() if hasattr(given, "numpy") else given)
-        row_shape = (3,) if width == 3 else ()
-        if array.ndim == 0 or array.shape[1:] != row_shape or len(array) < self._row_count:
-            wanted = f"have shape {(self._row_count, *row_shape)}, or more rows"
-            raise validate.fail(owner, name, wanted, array.shape, "give a row a particle")
-        with np.errstate(over="ignore"):  # becomes infinite, which is found below
-            values = np.ascontiguousarray(array, dtype=np.float32) * np.float32(scale)
-        if not np.isfinite(values).all():
-            row = int(np.argmin(np.isfinite(values.reshape(len(values), -1)).all(axis=1)))
-            raise validate.fail(
-                owner,
-                f"{name} of particle {row}{self._place(row)} at frame {frame}",
-                "be finite in single precision",
-                array[row],
-                "look for what made it so, or take a smaller dt",
-            )
-        return values
 
-    def _place(self, row: int) -> str:
-        for prim, path in zip(self.info.points, self._layout.points, strict=True):
-            found = np.flatnonzero(prim.rows == row)
-            if len(found):
-                return f" ({path}, id {prim.ids[found[0]]})"
-        return ""
+def _mould(manifest: Sdf.Layer) -> Sdf.Layer:
+    """What clips are made of: the declarations, to be filled."""
+    clip = Sdf.Layer.CreateAnonymous(".usdc")
+    clip.TransferContent(manifest)
+    return clip
 
 
 def _publish(layer: Sdf.Layer, path: Path) -> None:
@@ -247,19 +250,3 @@ def _publish(layer: Sdf.Layer, path: Path) -> None:
             f"UsdRecorder: {path} must be writable, got {reason[1] if reason else error}; free "
             "some space or choose another folder. Frames written before are kept."
         ) from error
-
-
-def _field_names(fields: dict[str, int]) -> dict[str, int]:
-    owner = "UsdRecorder"
-    primvars: dict[str, str] = {}
-    for name, width in fields.items():
-        if width not in (1, 3):
-            raise validate.fail(
-                owner, f"fields[{name!r}]", "have 1 or 3 numbers", width, "split it up"
-            )
-        primvar = usd_stage.primvar(name)
-        if primvar in TAKEN_FIELDS or primvar in primvars:
-            taken = f"have another name than {primvars.get(primvar, 'what USD has itself')!r}"
-            raise validate.fail(owner, "fields", taken, name, "leave it out or rename it")
-        primvars[primvar] = name
-    return fields

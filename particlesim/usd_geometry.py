@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from pxr import Gf
 
 if TYPE_CHECKING:
+    from .usd_frame import Frame
     from .usd_info import StageInfo
+    from .usd_shapes import Shape
 
 FOCAL_LENGTH = 35.0
 APERTURE = np.array([36.0, 20.25])  # 16:9, in the units of the focal length
@@ -22,7 +25,13 @@ FACES = np.array(
 
 
 def extent(points: np.ndarray, width: np.ndarray | float | None) -> np.ndarray:
-    """Lower and upper corner of (n, 3) points with diameters, (n,), one or none; (2, 3)."""
+    """Lower and upper corner of (n, 3) points with diameters, (n,), one or none; (2, 3).
+
+    Of no points it is USD's own empty range, whose lower corner is above the upper.
+    """
+    if not len(points):
+        largest = np.finfo(np.float32).max
+        return np.array([[largest] * 3, [-largest] * 3], dtype=np.float32)
     half = np.float32(0.5) * np.asarray(0.0 if width is None else width, dtype=np.float32)
     # Column by column: a reduction of (n, 3) over its rows takes ten times as long.
     columns = [points[:, k] for k in range(3)]
@@ -31,25 +40,82 @@ def extent(points: np.ndarray, width: np.ndarray | float | None) -> np.ndarray:
     return np.array([lower, upper], dtype=np.float32)
 
 
-def bounding_box(info: StageInfo, x: np.ndarray) -> np.ndarray:
-    """Corners of what the camera should see: particles, boundaries, near planes; (2, 3)."""
-    boxes = [extent(x[prim.indices], prim.widths).astype(np.float64) for prim in info.points]
-    for shape in info.shapes:
-        first, second = shape.parameters
-        if shape.kind == "box":
-            boxes.append(np.array([first, second]))
-        elif shape.kind == "sphere":
-            boxes.append(np.array([first - second, first + second]))
+def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals of points (n, 3): means of their triangles' (t, 3), weighted by area; float32.
+
+    A point without area around it has (0, 0, 1): a direction that renderers can use.
+    """
+    x = points.astype(np.float64)
+    a, b, c = (x[triangles[:, k]] for k in range(3))
+    twice_area = np.cross(b - a, c - a)
+    corners = triangles.ravel()
+    normals = np.stack(
+        [np.bincount(corners, np.repeat(twice_area[:, k], 3), len(x)) for k in range(3)], axis=1
+    )
+    length = np.linalg.norm(normals, axis=1)
+    flat = length == 0
+    normals[flat], length[flat] = (0.0, 0.0, 1.0), 1.0
+    return (normals / length[:, None]).astype(np.float32)
+
+
+def world_boxes(info: StageInfo, frame: Frame) -> dict[int, np.ndarray]:
+    """Corners of what there is to see of each world, in its own space: (2, 3) each.
+
+    Particles, surfaces, boundaries, and planes that are near.
+    """
+    boxes: dict[int, list[np.ndarray]] = {world: [] for world in info.worlds}
+    for prim, (rows, _) in zip(info.points, frame.clouds, strict=True):
+        boxes[prim.world].append(extent(frame.x[rows], frame.widths(prim, rows)))
+    for mesh, surface in zip(info.meshes, frame.surfaces, strict=True):
+        boxes[mesh.world].append(extent(surface.points, None))
+    for shape, pose in zip(info.shapes, frame.poses, strict=True):
+        if shape.kind != "plane":
+            boxes[shape.world].append(extent(posed(shape_corners(shape), pose), None))
     if info.periodic is not None:
-        boxes.append(np.where(np.isnan(info.periodic), boxes[0], info.periodic))
-    lower, upper = np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))
-    center, diagonal = 0.5 * (lower + upper), np.linalg.norm(upper - lower)
-    for shape in info.shapes:
+        for own in boxes.values():
+            own.append(np.where(np.isnan(info.periodic), joined(own), info.periodic))
+    result = {world: joined(own) for world, own in boxes.items()}
+    for shape, pose in zip(info.shapes, frame.poses, strict=True):
         if shape.kind == "plane":
-            foot = foot_of(center, *shape.parameters)
-            if np.linalg.norm(foot - center) <= 2.0 * diagonal:
-                lower, upper = np.minimum(lower, foot), np.maximum(upper, foot)
-    return np.array([lower, upper])
+            result[shape.world] = _with_plane(result[shape.world], *posed_plane(shape, pose))
+    return result
+
+
+def joined(boxes: Iterable[np.ndarray]) -> np.ndarray:
+    """The box around boxes (2, 3); the unit box around the origin where all are empty."""
+    full = [np.asarray(box, dtype=np.float64) for box in boxes if np.all(box[0] <= box[1])]
+    if not full:
+        return np.array([[-0.5] * 3, [0.5] * 3])
+    return np.array([np.min(full, axis=(0, 1)), np.max(full, axis=(0, 1))])
+
+
+def _with_plane(box: np.ndarray, point: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """The box and the foot of its middle on a plane, if that is near."""
+    center = box.mean(axis=0)
+    foot = foot_of(center, point, normal)
+    if np.linalg.norm(foot - center) > 2.0 * np.linalg.norm(box[1] - box[0]):
+        return box
+    return np.array([np.minimum(box[0], foot), np.maximum(box[1], foot)])
+
+
+def shape_corners(shape: Shape) -> np.ndarray:
+    """Points that a shape, other than a plane, is between; (n, 3)."""
+    first, second = shape.parameters
+    if shape.kind == "mesh":
+        return first
+    lower, upper = (first - second, first + second) if shape.kind == "sphere" else (first, second)
+    return lower + CORNERS * (upper - lower)
+
+
+def posed(points: np.ndarray, pose: np.ndarray | None) -> np.ndarray:
+    """Points (n, 3) moved by a pose (4, 4), if there is one."""
+    return points if pose is None else points @ pose[:3, :3] + pose[3, :3]
+
+
+def posed_plane(shape: Shape, pose: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """Point and normal of a plane where its pose puts it."""
+    point, normal = shape.parameters
+    return posed(point[None], pose)[0], normal if pose is None else normal @ pose[:3, :3]
 
 
 def foot_of(at: np.ndarray, point: np.ndarray, normal: np.ndarray) -> np.ndarray:

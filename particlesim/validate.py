@@ -92,6 +92,35 @@ def rows(owner: str, argument: str, value: Any, count: int | None, width: int | 
     return result
 
 
+def triangles(owner: str, value: Any, count: int, *, proper: bool = True) -> np.ndarray:
+    """``value`` as (t, 3) int64 indices of ``count`` points.
+
+    ``proper``: at least one triangle, and three different corners each.
+    """
+    array = np.asarray(value)
+    if array.size == 0 and not proper:
+        return np.zeros((0, 3), dtype=np.int64)
+    shaped = array.ndim == 2 and array.shape[1] == 3 and len(array) > 0
+    if not shaped or not np.issubdtype(array.dtype, np.integer):
+        raise fail(
+            owner, "triangles", "be whole numbers of shape (t, 3)", value, "give three a triangle"
+        )
+    if array.min() < 0 or array.max() >= count:
+        worst = array.max() if array.max() >= count else array.min()
+        raise fail(
+            owner, "triangles", f"hold indices from 0 to {count - 1}", int(worst),
+            "count the points from 0",
+        )  # fmt: skip
+    turned = np.roll(array, 1, axis=1)
+    if proper and (array == turned).any():
+        at = int(np.argmax((array == turned).any(axis=1)))
+        raise fail(
+            owner, f"triangles[{at}]", "have three different corners", array[at].tolist(),
+            "leave it out",
+        )  # fmt: skip
+    return array.astype(np.int64)
+
+
 def _array(owner: str, argument: str, value: Any) -> np.ndarray:
     if hasattr(value, "numpy"):
         value = value.numpy()
