@@ -1,23 +1,32 @@
-"""Boundaries: planes and boxes that particles stay inside of, by their radius."""
+"""Boundaries that hold particles off by their radius: one skeleton, a shape plugged into it."""
 
 import functools
+from types import SimpleNamespace
 from typing import Any
 
 import warp as wp
 
-from .constraints import bodies_type, place_function
+from .boundary_shapes import Shape
+from .constraints import bodies_type, place_function, rounding_function
 from .easing import ease_function, easing_type
 from .precision import Precision, function, register, structure
+from .rigid_motion import frame_functions, pose_type
+
+
+def held_type(precision: Precision, shape: Shape) -> Any:
+    """The particles that a boundary of a shape holds; one type for all of as many sides."""
+    return _held_type(precision, shape.sides)
 
 
 @functools.cache
-def held_type(precision: Precision, each: Any) -> Any:
-    """The particles that a boundary holds, with one ``each`` of slack and of grip.
+def _held_type(precision: Precision, sides: int) -> Any:
+    """The particles that a boundary holds, with slack and grip by side.
 
     Grip is how far friction may still take particles back in this substep: mu times the normal
     corrections less what it has taken. It outlives an iteration, so that a side that one iteration
     pressed on holds against what the next one does along it.
     """
+    each = precision.vector(sides)
     fields = {
         "particle": wp.array(dtype=wp.int32),
         "world": wp.array(dtype=wp.int32),
@@ -25,8 +34,9 @@ def held_type(precision: Precision, each: Any) -> Any:
         "slack": wp.array(dtype=each),
         "marked": wp.array(dtype=wp.int32),  # worlds whose slack is to be measured
         "grip": wp.array(dtype=each),  # empty where nothing rubs
+        "pose": wp.array(dtype=pose_type(precision)),  # by world; empty where nothing moves
     }
-    return structure(f"Held_{precision.name}_{each.__name__}", fields)
+    return structure(f"Held{sides}_{precision.name}", fields)
 
 
 @functools.cache
@@ -34,7 +44,7 @@ def friction_function(precision: Precision) -> wp.Function:
     """``rub(u, n, grip)``: what friction takes back of the way u along a side of normal n.
 
     All of the tangential way, or as much as there is grip for (Macklin et al. 2014, eq. 24, with
-    one coefficient).
+    one coefficient). Grip is above 0.
     """
     vec3, real = precision.vec3, precision.scalar
 
@@ -65,189 +75,136 @@ def bounce_function(precision: Precision) -> wp.Function:
 
 
 @functools.cache
-def plane_kernels(
-    precision: Precision, params: Any, compensated: bool, forces: bool
-) -> tuple[wp.Kernel, wp.Kernel, wp.Kernel]:
-    """Kernels of a half space (x - point) . n >= R: start of a substep, projection, bounce."""
-    vec3, real = precision.vec3, precision.scalar
-    Bodies, Easing, Held = (
-        bodies_type(precision),
-        easing_type(precision),
-        held_type(precision, real),
-    )
-    place, ease = place_function(precision, compensated), ease_function(precision)
-    friction, rebound = friction_function(precision), bounce_function(precision)
+def meeting_function(shape: Shape, precision: Precision, params: Any, moving: bool) -> wp.Function:
+    """``meet(i, w, x, e, slack, p, h) -> (back, N)``: what particle i at x + e meets in world w.
 
-    def height(i: int, p: params, b: Bodies):
-        d = b.x[i] - p.point
-        if wp.static(compensated):
-            d = d + b.x_error[i]
-        return wp.dot(d, p.normal)
+    The way back to each side, and the sides' normals (see ``boundary_shapes``).
+    """
+    vec3, sides, each = precision.vec3, shape.sides, shape.each(precision)
+    Held = held_type(precision, shape)
+    surface, frame = shape.function(precision, params), frame_functions(precision)
+    inward, outward = frame.inward, frame.outward
 
-    above = function(height)
+    def meet(i: int, w: int, x: vec3, e: vec3, slack: each, p: params, h: Held):
+        y = x
+        rest = e
+        if wp.static(moving):
+            y, rest = inward(y, rest, h.pose[w])
+        back, N = surface(y, rest, h.radius[i], slack, p)
+        if wp.static(moving):
+            for a in range(wp.static(sides)):
+                N[a] = outward(N[a], h.pose[w])
+        return back, N
 
-    @register
-    def begin_plane(
-        first: int, parameters: wp.array(dtype=params), h: Held, b: Bodies, easing: Easing, dt: real
-    ):
-        k = first + wp.tid()
-        i = h.particle[k]
-        p = parameters[h.world[k]]
-        R = h.radius[i]
-        s = h.slack[k]
-        if h.marked[h.world[k]] != 0:
-            # Where the substep began: the way since is no overlap.
-            s = wp.max(R - (above(i, p, b) - dt * wp.dot(b.v[i], p.normal)), real(0.0))
-        if s > real(0.0):
-            s = ease(s, R, dt, easing)
-        h.slack[k] = s
-        if p.friction > real(0.0):
-            h.grip[k] = real(0.0)
-
-    @register
-    def project_plane(
-        first: int, parameters: wp.array(dtype=params), h: Held, b: Bodies, moving: real, dt: real
-    ):
-        k = first + wp.tid()
-        i = h.particle[k]
-        p = parameters[h.world[k]]
-        d = wp.max(h.radius[i] - moving * h.slack[k] - above(i, p, b), real(0.0))
-        dx = p.normal * d
-        rubs = moving * p.friction > real(0.0)
-        if rubs:
-            grip = h.grip[k] + p.friction * d
-            rubs = grip > real(0.0)
-            taken = friction(b.v[i] * dt + b.correction[i], p.normal, grip)
-            h.grip[k] = grip - wp.length(taken)
-            dx = dx - taken
-        if (d > real(0.0) or rubs) and b.w[i] > real(0.0):
-            e = vec3()
-            if wp.static(compensated):
-                e = b.x_error[i]
-            place(i, b.x[i], e, dx, b)
-
-    @register
-    def bounce_plane(
-        first: int,
-        parameters: wp.array(dtype=params),
-        h: Held,
-        b: Bodies,
-        f: wp.array(dtype=vec3),
-        dt: real,
-        inverse_dt: real,
-    ):
-        k = first + wp.tid()
-        i = h.particle[k]
-        p = parameters[h.world[k]]
-        c = b.correction[i]
-        d = h.radius[i] - h.slack[k] - (above(i, p, b) - wp.dot(c, p.normal))
-        if p.restitution > real(0.0) and d > real(0.0) and b.w[i] > real(0.0):
-            v = b.v[i]
-            before = v - c * inverse_dt
-            if wp.static(forces):
-                before = before - f[i] * (b.w[i] * dt)
-            dv = rebound(wp.dot(before, p.normal), wp.dot(v, p.normal), p.restitution)
-            b.v[i] = v + p.normal * dv
-
-    return begin_plane, project_plane, bounce_plane
+    return function(meet)
 
 
 @functools.cache
-def box_kernels(
-    precision: Precision, params: Any, compensated: bool, forces: bool
-) -> tuple[wp.Kernel, wp.Kernel, wp.Kernel]:
-    """Kernels of the inside of a box, lower + R <= x <= upper - R: as for a plane.
+def relative_functions(
+    shape: Shape, precision: Precision, moving: bool
+) -> tuple[wp.Function, wp.Function]:
+    """Against the surface: ``velocity_of(x, v, w, h)`` and ``slip_of(x, u, dt, w, h)``.
 
-    Slack and grip are by axis. Where the box is too narrow for a particle, the middle is right.
+    The velocity v of what is at x, and the way u by which it came there.
     """
-    vec3, real = precision.vec3, precision.scalar
-    Bodies, Easing, Held = (
-        bodies_type(precision),
-        easing_type(precision),
-        held_type(precision, vec3),
-    )
-    place, ease = place_function(precision, compensated), ease_function(precision)
+    vec3, real, Held = precision.vec3, precision.scalar, held_type(precision, shape)
+    frame = frame_functions(precision)
+    velocity, way = frame.velocity, frame.way
+
+    def velocity_of(x: vec3, v: vec3, w: int, h: Held):
+        if wp.static(moving):
+            return v - velocity(x, h.pose[w])
+        else:
+            return v
+
+    def slip_of(x: vec3, u: vec3, dt: real, w: int, h: Held):
+        if wp.static(moving):
+            return u - way(x, u, dt, h.pose[w])
+        else:
+            return u
+
+    return function(velocity_of), function(slip_of)
+
+
+@functools.cache
+def boundary_kernels(
+    shape: Shape, precision: Precision, params: Any, compensated: bool, forces: bool, moving: bool
+) -> SimpleNamespace:
+    """Kernels of a shape: ``begin`` a substep, ``project``, ``bounce``."""
+    vec3, real, each = precision.vec3, precision.scalar, shape.each(precision)
+    sides, normals = shape.sides, shape.normals(precision)
+    Bodies, Held = bodies_type(precision), held_type(precision, shape)
+    Easing = easing_type(precision)
+    kept, place = rounding_function(precision, compensated), place_function(precision, compensated)
+    ease = ease_function(precision)
     friction, rebound = friction_function(precision), bounce_function(precision)
+    meet = meeting_function(shape, precision, params, moving)
+    velocity_of, slip_of = relative_functions(shape, precision, moving)
 
-    def outside(x: real, e: real, lower: real, upper: real, radius: real, slack: real):
-        """Way back between the sides that are closed; infinite ones are open."""
-        first = lower + radius
-        last = upper - radius
-        if first > last:
-            first = real(0.5) * (lower + upper)
-            last = first
-        low = (first - slack - x) - e
-        high = (last + slack - x) - e
-        return wp.max(low, real(0.0)) + wp.min(high, real(0.0))
-
-    way_back = function(outside)
-
-    def along_sides(k: int, i: int, back: vec3, mu: real, h: Held, b: Bodies, dt: real):
-        """What friction takes on all sides."""
-        u = b.v[i] * dt + b.correction[i]
-        grip = h.grip[k]
-        for a in range(3):
-            if back[a] != real(0.0):  # a way into one side is no slip along another
-                u[a] = real(0.0)
+    def along_sides(k: int, u: vec3, back: each, N: normals, mu: real, h: Held):
+        """What friction takes of the way u on all sides."""
+        grip = h.grip[k] + back * mu
+        if wp.static(sides > 1):
+            for a in range(wp.static(sides)):
+                if back[a] > real(0.0):  # a way into one side is no slip along another
+                    u = u - N[a] * wp.dot(u, N[a])
         total = vec3()
-        for a in range(3):
-            n = vec3()
-            n[a] = real(1.0)
-            limit = grip[a] + mu * wp.abs(back[a])
-            taken = friction(u, n, limit)
-            grip[a] = limit - wp.length(taken)
-            total = total + taken
-            u = u - taken
+        for a in range(wp.static(sides)):
+            if grip[a] > real(0.0):
+                taken = friction(u, N[a], grip[a])
+                grip[a] = grip[a] - wp.length(taken)
+                total = total + taken
+                u = u - taken
         h.grip[k] = grip
         return total
 
     rub = function(along_sides)
 
     @register
-    def begin_box(
+    def begin_boundary(
         first: int, parameters: wp.array(dtype=params), h: Held, b: Bodies, easing: Easing, dt: real
     ):
         k = first + wp.tid()
         i = h.particle[k]
-        p = parameters[h.world[k]]
-        R = h.radius[i]
+        w = h.world[k]
+        p = parameters[w]
         slack = h.slack[k]
-        for a in range(3):
-            s = slack[a]
-            if h.marked[h.world[k]] != 0:
-                # Where the substep began: the way since is no overlap.
-                start = b.x[i][a] - dt * b.v[i][a]
-                s = wp.abs(way_back(start, real(0.0), p.lower[a], p.upper[a], R, real(0.0)))
-            if s > real(0.0):
-                s = ease(s, R, dt, easing)
-            slack[a] = s
+        if h.marked[w] != 0:
+            # Where the substep began: the way since is no overlap. The subtraction rounds as much
+            # as a compensated sum has kept.
+            start = b.x[i] - dt * velocity_of(b.x[i], b.v[i], w, h)
+            slack, _N = meet(i, w, start, vec3(), each(), p, h)
+        for a in range(wp.static(sides)):
+            if slack[a] > real(0.0):
+                slack[a] = ease(slack[a], h.radius[i], dt, easing)
         h.slack[k] = slack
         if p.friction > real(0.0):
-            h.grip[k] = vec3()
+            h.grip[k] = each()
 
     @register
-    def project_box(
-        first: int, parameters: wp.array(dtype=params), h: Held, b: Bodies, moving: real, dt: real
+    def project_boundary(
+        first: int, parameters: wp.array(dtype=params), h: Held, b: Bodies, timed: real, dt: real
     ):
+        """``timed`` 0: a projection outside of time, which knows neither slack nor friction."""
         k = first + wp.tid()
         i = h.particle[k]
-        p = parameters[h.world[k]]
+        w = h.world[k]
+        p = parameters[w]
         x = b.x[i]
-        e = vec3()
-        if wp.static(compensated):
-            e = b.x_error[i]
+        e = kept(i, b)
+        back, N = meet(i, w, x, e, h.slack[k] * timed, p, h)
         dx = vec3()
-        for a in range(3):
-            slack = moving * h.slack[k][a]
-            dx[a] = way_back(x[a], e[a], p.lower[a], p.upper[a], h.radius[i], slack)
-        if moving * p.friction > real(0.0):
-            dx = dx - rub(k, i, dx, p.friction, h, b, dt)
+        for a in range(wp.static(sides)):
+            dx = dx + N[a] * back[a]
+        if timed * p.friction > real(0.0):
+            u = b.v[i] * dt + b.correction[i]
+            dx = dx - rub(k, slip_of(x, u, dt, w, h), back, N, p.friction, h)
         touched = dx[0] != real(0.0) or dx[1] != real(0.0) or dx[2] != real(0.0)
         if touched and b.w[i] > real(0.0):
             place(i, x, e, dx, b)
 
     @register
-    def bounce_box(
+    def bounce_boundary(
         first: int,
         parameters: wp.array(dtype=params),
         h: Held,
@@ -258,24 +215,22 @@ def box_kernels(
     ):
         k = first + wp.tid()
         i = h.particle[k]
-        p = parameters[h.world[k]]
+        w = h.world[k]
+        p = parameters[w]
         if p.restitution > real(0.0) and b.w[i] > real(0.0):
-            c = b.correction[i]
             x = b.x[i]
-            e = vec3()
-            if wp.static(compensated):
-                e = b.x_error[i]
-            v = b.v[i]
+            c = b.correction[i]
+            back, N = meet(i, w, x, kept(i, b) - c, h.slack[k], p, h)
+            v = velocity_of(x, b.v[i], w, h)
             before = v - c * inverse_dt
             if wp.static(forces):
                 before = before - f[i] * (b.w[i] * dt)
-            for a in range(3):
-                slack = h.slack[k][a]
-                back = way_back(x[a] - c[a], e[a], p.lower[a], p.upper[a], h.radius[i], slack)
-                inward = wp.where(back > real(0.0), real(1.0), real(-1.0))
-                if back != real(0.0):
-                    dv = rebound(before[a] * inward, v[a] * inward, p.restitution)
-                    v[a] = v[a] + inward * dv
-            b.v[i] = v
+            dv = vec3()
+            for a in range(wp.static(sides)):
+                if back[a] > real(0.0):
+                    n = N[a]
+                    now = wp.dot(v + dv, n)
+                    dv = dv + n * rebound(wp.dot(before, n), now, p.restitution)
+            b.v[i] = b.v[i] + dv
 
-    return begin_box, project_box, bounce_box
+    return SimpleNamespace(begin=begin_boundary, project=project_boundary, bounce=bounce_boundary)

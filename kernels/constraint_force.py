@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from .constraints import bodies_type, load_function, seen_function, tuples_type
+from .constraints import bodies_type, tuples_type, view_function
 from .loops import Periodicity, box_type
 from .precision import Precision, register
 
@@ -28,8 +28,7 @@ def force_kernels(
     """Kernels: f_a -= grad_a C (C / alpha + beta dC/dt); energy C^2 / (2 alpha) and virial."""
     vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
     Bodies, Tuples = bodies_type(precision), tuples_type(precision, size, item)
-    load = load_function(precision, compensated, size)
-    seen = seen_function(precision, periodic, compensated, size, relative)
+    view = view_function(evaluate, precision, periodic, compensated, size, item, relative)
 
     @register
     def constraint_force(
@@ -47,8 +46,7 @@ def force_kernels(
             r = seats.tuple[n]
             ids = t.particle[r]
             q = t.item[r]
-            x, e = load(ids, b)
-            C, G = evaluate(seen(x, e, box, t.world, r), q)
+            _x, _e, _X, C, G = view(r, box, t, b)
             rate = real(0.0)
             for a in range(wp.static(size)):
                 rate += wp.dot(G[a], b.v[ids[a]])
@@ -74,12 +72,9 @@ def force_kernels(
         i = seats.particle[k]
         for n in range(seats.begin[k], seats.begin[k + 1]):
             r = seats.tuple[n]
-            q = t.item[r]
-            x, e = load(t.particle[r], b)
-            X = seen(x, e, box, t.world, r)
-            C, G = evaluate(X, q)
+            _x, _e, X, C, G = view(r, box, t, b)
             a = seats.seat[n]
-            pull = C / q.compliance
+            pull = C / t.item[r].compliance
             if t.one_sided != 0 and C >= real(0.0):
                 pull = real(0.0)
             w = -pull * wp.dot(G[a], X[a] - X[0])

@@ -51,6 +51,20 @@ def positions_type(precision: Precision, size: int) -> Any:
 
 
 @functools.cache
+def rounding_function(precision: Precision, compensated: bool) -> wp.Function:
+    """``kept(i, b)``: what rounding has kept from the position of particle i."""
+    vec3, Bodies = precision.vec3, bodies_type(precision)
+
+    def kept(i: int, b: Bodies):
+        if wp.static(compensated):
+            return b.x_error[i]
+        else:
+            return vec3()
+
+    return function(kept)
+
+
+@functools.cache
 def place_function(precision: Precision, compensated: bool) -> wp.Function:
     """``place(i, x, e, dx, b)``: particle i goes from x, with rounding error e, on by dx."""
     vec3, Bodies = precision.vec3, bodies_type(precision)
@@ -106,54 +120,47 @@ def distance_evaluation(sign: int, precision: Precision, item: Any) -> wp.Functi
 
 
 @functools.cache
-def load_function(precision: Precision, compensated: bool, size: int) -> wp.Function:
-    """``load(ids, b) -> (x, e)``: positions of a tuple, and what rounding has kept from them."""
-    Bodies, positions = bodies_type(precision), positions_type(precision, size)
-    indices = wp.types.vector(length=size, dtype=wp.int32)
+def view_function(
+    evaluate: wp.Function, precision: Precision, periodic: Periodicity, compensated: bool,
+    size: int, item: Any, relative: bool,
+) -> wp.Function:  # fmt: skip
+    """``view(r, box, t, b) -> (x, e, X, C, G)``: tuple r as it is now.
 
-    def load(ids: indices, b: Bodies):
+    Its positions, what rounding has kept from them, what the evaluation sees of both, in one piece
+    of a periodic box, and what it makes of it.
+
+    ``relative``: seen from the first particle, together with what rounding has kept: far from the
+    origin a distance is then as exact as near to it.
+    """
+    Box, positions = box_type(precision), positions_type(precision, size)
+    Bodies, Tuples = bodies_type(precision), tuples_type(precision, size, item)
+    image, wraps = minimum_image(precision, periodic), bool(periodic)
+
+    def view(r: int, box: wp.array(dtype=Box), t: Tuples, b: Bodies):
+        ids = t.particle[r]
         x = positions()
         e = positions()
         for a in range(wp.static(size)):
             x[a] = b.x[ids[a]]
             if wp.static(compensated):
                 e[a] = b.x_error[ids[a]]
-        return x, e
-
-    return function(load)
-
-
-@functools.cache
-def seen_function(
-    precision: Precision, periodic: Periodicity, compensated: bool, size: int, relative: bool
-) -> wp.Function:
-    """``seen(x, e, box, world, r)``: what an evaluation sees of the positions, in one piece.
-
-    ``relative``: taken from the first particle, together with what rounding has kept from them:
-    far from the origin a distance is then as exact as near to it.
-    """
-    Box, positions = box_type(precision), positions_type(precision, size)
-    image, wraps = minimum_image(precision, periodic), bool(periodic)
-
-    def seen(
-        x: positions, e: positions, box: wp.array(dtype=Box), world: wp.array(dtype=wp.int32),
-        r: int,
-    ):  # fmt: skip
         X = x
         if wp.static(relative or wraps):
             for a in range(wp.static(size)):
                 d = x[a] - x[0]
                 if wp.static(wraps):
-                    d = image(d, box[world[r]])
+                    d = image(d, box[t.world[r]])
                 if wp.static(relative):
                     if wp.static(compensated):
                         d = d + (e[a] - e[0])
                     X[a] = d
                 else:
                     X[a] = x[0] + d
-        return X
+        C, G = evaluate(X, t.item[r])
+        return x, e, X, C, G
 
-    return function(seen)
+    # Emitted behind the evaluation, which may itself stand behind the adjoints that it calls.
+    return function(view, after_gradients=True)
 
 
 @functools.cache
@@ -172,11 +179,8 @@ def project_kernel(
     real, Box = precision.scalar, box_type(precision)
     Bodies, Tuples = bodies_type(precision), tuples_type(precision, size, item)
     weights = wp.types.vector(length=size, dtype=real)
-    load, place = (
-        load_function(precision, compensated, size),
-        place_function(precision, compensated),
-    )
-    seen = seen_function(precision, periodic, compensated, size, relative)
+    view = view_function(evaluate, precision, periodic, compensated, size, item, relative)
+    place = place_function(precision, compensated)
 
     @register
     def project_tuples(
@@ -194,8 +198,7 @@ def project_kernel(
                 return
         ids = t.particle[r]
         q = t.item[r]
-        x, e = load(ids, b)
-        C, G = evaluate(seen(x, e, box, t.world, r), q)
+        x, e, _X, C, G = view(r, box, t, b)
         w = weights()
         s = real(0.0)
         for a in range(wp.static(size)):
@@ -251,8 +254,7 @@ def strain_kernel(
     """Kernel: force of each tuple, |lam| max_a |grad_a C| / dt^2; what exceeds its limit breaks."""
     real, Box = precision.scalar, box_type(precision)
     Bodies, Tuples = bodies_type(precision), tuples_type(precision, size, item)
-    load = load_function(precision, compensated, size)
-    seen = seen_function(precision, periodic, compensated, size, relative)
+    view = view_function(evaluate, precision, periodic, compensated, size, item, relative)
 
     @register
     def strain_tuples(
@@ -265,15 +267,13 @@ def strain_kernel(
         force_out: wp.array(dtype=real),
     ):
         r = first + wp.tid()
-        q = t.item[r]
-        x, e = load(t.particle[r], b)
-        _C, G = evaluate(seen(x, e, box, t.world, r), q)
+        _x, _e, _X, _C, G = view(r, box, t, b)
         steepest = real(0.0)
         for a in range(wp.static(size)):
             steepest = wp.max(steepest, wp.length(G[a]))
         force = wp.abs(t.lam[r]) * steepest * scale[0]
         force_out[r] = force
-        if may_break != 0 and force > q.break_force:
+        if may_break != 0 and force > t.item[r].break_force:
             t.broken[r] = 1
 
     return strain_tuples

@@ -13,7 +13,7 @@ from typing import Any
 
 import warp as wp
 
-from .constraints import bodies_type, place_function
+from .constraints import bodies_type, place_function, rounding_function
 from .contact import contact_types
 from .loops import reader
 from .precision import Precision, function
@@ -43,21 +43,33 @@ def _separation_function(precision: Precision) -> wp.Function:
 
 
 @functools.cache
+def _of_pairs(precision: Precision) -> tuple[wp.Function, wp.Function, wp.Function]:
+    """What terms take of a pair: ``separation`` as above; ``both(a, i, j)``, the sum of the two's
+    numbers in an array, and ``between(a, i, j)``, the difference of their vectors.
+    """
+    real, vec3 = precision.scalar, precision.vec3
+    number, vector = reader(precision), reader(precision, 3)
+
+    def both(a: wp.array(dtype=real), i: int, j: int):
+        return number(a, i) + number(a, j)
+
+    def between(a: wp.array(dtype=vec3), i: int, j: int):
+        return vector(a, i) - vector(a, j)
+
+    return _separation_function(precision), function(both), function(between)
+
+
+@functools.cache
 def crowding_term(precision: Precision, params: Any, bounce: bool) -> wp.Function:
     """Term: n n^T of a pair in contact, as its six entries; bounce: that approached at first."""
     vec3, real, six = precision.vec3, precision.scalar, precision.vector(6)
-    Data, _ = contact_types(precision)
-    separation, number, vector = (
-        _separation_function(precision),
-        reader(precision),
-        reader(precision, 3),
-    )
+    (Data, _), (separation, both, between) = contact_types(precision), _of_pairs(precision)
 
     def crowding(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
         r, n = separation(i, j, x_ij, r2, p.closest_squared)
-        weight = wp.where(r < number(d.radius, i) + number(d.radius, j), real(1.0), real(0.0))
+        weight = wp.where(r < both(d.radius, i, j), real(1.0), real(0.0))
         if wp.static(bounce):
-            approach = wp.dot(n, vector(d.way, i) - vector(d.way, j))
+            approach = wp.dot(n, between(d.way, i, j))
             weight = wp.where(approach < real(0.0), weight, real(0.0))
         m = n * weight
         return six(m[0] * n[0], m[0] * n[1], m[0] * n[2], m[1] * n[1], m[1] * n[2], m[2] * n[2])
@@ -107,18 +119,13 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
     mu lam (Macklin et al. 2014, eq. 24).
     """
     vec3, real = precision.vec3, precision.scalar
-    Data, _ = contact_types(precision)
-    separation, number, vector = (
-        _separation_function(precision),
-        reader(precision),
-        reader(precision, 3),
-    )
+    (Data, _), (separation, both, between) = contact_types(precision), _of_pairs(precision)
 
     def push(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
         r, n = separation(i, j, x_ij, r2, p.closest_squared)
-        reach = number(d.radius, i) + number(d.radius, j)
+        reach = both(d.radius, i, j)
         touching = r < reach
-        u = vector(d.way, i) - vector(d.way, j)
+        u = between(d.way, i, j)
         # A pair that has passed through each other goes back the way it came.
         y = x_ij - u
         y2 = wp.dot(y, y)
@@ -126,7 +133,7 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
         turned = wp.where(through, real(1.0), real(0.0))
         n = n * (real(1.0) - turned) + y * (turned / wp.sqrt(wp.where(through, y2, real(1.0))))
         r = wp.where(through, wp.dot(n, x_ij), r)
-        share = number(d.share, i) + number(d.share, j)
+        share = both(d.share, i, j)
         soft = share + p.compliance * d.inverse_dt_squared
         active = touching and share > real(0.0)
         lam = wp.where(active, reach - r, real(0.0)) / wp.where(active, soft, real(1.0))
@@ -134,7 +141,7 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
         if wp.static(friction):
             t = u - n * wp.dot(u, n)
             length = wp.sqrt(wp.dot(t, t))
-            split = wp.max(number(d.grip, i) + number(d.grip, j), real(1.0e-30))
+            split = wp.max(both(d.grip, i, j), real(1.0e-30))
             limit = p.friction * lam / wp.max(length, real(1.0e-30))
             result = result - t * wp.min(real(1.0) / split, limit)
         return result
@@ -150,19 +157,14 @@ def bounce_term(precision: Precision, params: Any) -> wp.Function:
     what rests under gravity does not bounce.
     """
     vec3, real = precision.vec3, precision.scalar
-    Data, _ = contact_types(precision)
-    separation, number, vector = (
-        _separation_function(precision),
-        reader(precision),
-        reader(precision, 3),
-    )
+    (Data, _), (separation, both, between) = contact_types(precision), _of_pairs(precision)
 
     def bounce(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
         _r, n = separation(i, j, x_ij, r2, p.closest_squared)
-        reach = number(d.radius, i) + number(d.radius, j)
-        share = number(d.share, i) + number(d.share, j)
-        before = wp.dot(vector(d.way, i) - vector(d.way, j), n)
-        missing = -p.restitution * before - wp.dot(vector(d.v, i) - vector(d.v, j), n)
+        reach = both(d.radius, i, j)
+        share = both(d.share, i, j)
+        before = wp.dot(between(d.way, i, j), n)
+        missing = -p.restitution * before - wp.dot(between(d.v, i, j), n)
         touching = r2 < reach * reach and share > real(0.0)
         hit = touching and before < real(0.0) and missing > real(0.0)
         return n * (wp.where(hit, missing, real(0.0)) / wp.where(hit, share, real(1.0)))
@@ -204,15 +206,12 @@ def store_correction(precision: Precision, params: Any, compensated: bool) -> wp
     """Store: x += w sum, and the same into the correction."""
     vec3, real = precision.vec3, precision.scalar
     (Data, _), Bodies = contact_types(precision), bodies_type(precision)
-    place = place_function(precision, compensated)
+    kept, place = rounding_function(precision, compensated), place_function(precision, compensated)
 
     def correct(i: int, particle: int, total: vec3, d: Data, p: params, o: Bodies):
         touched = total[0] != real(0.0) or total[1] != real(0.0) or total[2] != real(0.0)
         if touched:
-            e = vec3()
-            if wp.static(compensated):
-                e = o.x_error[particle]
-            place(particle, o.x[particle], e, total * o.w[particle], o)
+            place(particle, o.x[particle], kept(particle, o), total * o.w[particle], o)
 
     return function(correct)
 

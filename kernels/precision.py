@@ -23,12 +23,16 @@ import numpy as np
 import warp as wp
 from warp._src.codegen import Struct
 
+from .extremes import larger, smaller, within
+
 # Generic names that a law may use, and what they become in float64.
 _DOUBLE = {
     name: getattr(wp, f"{name}d")
     for name in ("vec2", "vec3", "vec4", "mat22", "mat33", "mat44", "quat")
 }
 _DOUBLE["float32"] = wp.float64
+# What laws call in place of Warp's own, so that their derivatives vectorise.
+_EXTREMES = {"max": larger, "min": smaller, "clamp": within}
 
 
 @dataclass(frozen=True)
@@ -82,6 +86,8 @@ class _Rewriter(ast.NodeTransformer):
             return self._number(known) if isinstance(value, float) else known
         if self.double and owner is wp and node.attr in _DOUBLE:
             return _name(f"_{node.attr}_double", node)
+        if owner is wp and node.attr in _EXTREMES:
+            return _name(f"_{node.attr}_derived", node)
         return node if owner is not None else self.generic_visit(node)
 
     def _meaning(self, node: ast.AST) -> Any:
@@ -137,7 +143,11 @@ def translate(
     source = _rewritten(func, precision, scope)
     names = func.__globals__.keys() & set(func.__code__.co_names) - {func.__name__}
     used = {name: constant(resolve(scope[name]), precision) for name in [*sorted(names), *cells]}
-    extra = {"_float64": wp.float64, **{f"_{k}_double": v for k, v in _DOUBLE.items()}}
+    extra = {
+        "_float64": wp.float64,
+        **{f"_{k}_double": v for k, v in _DOUBLE.items()},
+        **{f"_{k}_derived": v for k, v in _EXTREMES.items()},
+    }
     copy = types.FunctionType(
         func.__code__,
         {**func.__globals__, **used, **extra},

@@ -7,7 +7,7 @@ import warp as wp
 
 from .boundary import held_type, meeting_function
 from .boundary_shapes import Shape
-from .constraints import bodies_type, load_function, seen_function, tuples_type
+from .constraints import bodies_type, rounding_function, tuples_type, view_function
 from .loops import Pairs, Periodicity, box_type, minimum_image
 from .precision import Precision, register
 
@@ -20,8 +20,7 @@ def tuples_kernel(
     """Kernel: C of each tuple; of an inequality what is below 0, of a broken one nothing."""
     real, Box = precision.scalar, box_type(precision)
     Bodies, Tuples = bodies_type(precision), tuples_type(precision, size, item)
-    load = load_function(precision, compensated, size)
-    seen = seen_function(precision, periodic, compensated, size, relative)
+    view = view_function(evaluate, precision, periodic, compensated, size, item, relative)
 
     @register
     def miss_tuples(
@@ -32,8 +31,7 @@ def tuples_kernel(
         miss_out: wp.array(dtype=real),
     ):
         r = first + wp.tid()
-        x, e = load(t.particle[r], b)
-        C, _G = evaluate(seen(x, e, box, t.world, r), t.item[r])
+        _x, _e, _X, C, _G = view(r, box, t, b)
         if t.one_sided != 0:
             C = wp.min(C, real(0.0))
         if t.breakable != 0:
@@ -49,9 +47,10 @@ def boundary_kernel(
     shape: Shape, precision: Precision, params: Any, compensated: bool, moving: bool
 ) -> wp.Kernel:
     """Kernel: how deep each particle is inside of a boundary, on its worst side."""
-    vec3, real, each = precision.vec3, precision.scalar, shape.each(precision)
+    real, each = precision.scalar, shape.each(precision)
     Bodies, Held = bodies_type(precision), held_type(precision, shape)
-    meet = meeting_function(shape, precision, params, compensated, moving)
+    meet = meeting_function(shape, precision, params, moving)
+    kept = rounding_function(precision, compensated)
 
     @register
     def miss_boundary(
@@ -64,7 +63,7 @@ def boundary_kernel(
         k = first + wp.tid()
         i = h.particle[k]
         w = h.world[k]
-        back, _N = meet(i, w, b.x[i], vec3(), each(), parameters[w], h, b)
+        back, _N = meet(i, w, b.x[i], kept(i, b), each(), parameters[w], h)
         miss_out[k] = wp.max(back)
 
     return miss_boundary

@@ -8,8 +8,10 @@ from .constraints import (
     Contact,
     Distance,
     PlaneBoundary,
+    SphereBoundary,
 )
-from .errors import SimulationError
+from .errors import SimulationError, SimulationWarning
+from .history import History, read_history
 from .interactions import (
     SPH,
     ArtificialViscosity,
@@ -28,9 +30,13 @@ from .interactions import (
 )
 from .law import Law, law
 from .record import UsdRecorder
+from .render import Camera
 from .scene import Group, Scene
 from .settings import Settings
 from .simulation import Simulation
+from .stability import Stability, StabilityWarning
+from .stress import Stress, stress
+from .surface import Surface
 from .tradeoff import Tradeoff, tradeoff
 
 __version__ = "0.1.0"
@@ -39,6 +45,7 @@ __all__ = [
     "SPH",
     "ArtificialViscosity",
     "BoxBoundary",
+    "Camera",
     "ConstantForce",
     "Constraint",
     "ConstraintForce",
@@ -47,6 +54,7 @@ __all__ = [
     "Drag",
     "Gravity",
     "Group",
+    "History",
     "Interaction",
     "Law",
     "LennardJones",
@@ -59,12 +67,20 @@ __all__ = [
     "Settings",
     "Simulation",
     "SimulationError",
+    "SimulationWarning",
+    "SphereBoundary",
     "Springs",
+    "Stability",
+    "StabilityWarning",
+    "Stress",
+    "Surface",
     "Tait",
     "Tradeoff",
     "UniformGravity",
     "UsdRecorder",
     "law",
+    "read_history",
     "sample",
+    "stress",
     "tradeoff",
 ]

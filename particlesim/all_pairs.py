@@ -38,7 +38,9 @@ class AllPairs:
         self.pairs.begin = model.array(self.begin_host, wp.int32)
         self.pairs.end = model.array(self.end_host, wp.int32)
         self.users: list[str] = []
-        self.for_interactions = self.for_constraints = False
+        # By world: whether it renews the list before interactions, and before constraints.
+        self.for_interactions, self.for_constraints = np.zeros((2, model.world_count), dtype=bool)
+        self.leader = np.zeros(model.world_count, dtype=int)  # see Neighbors
 
     def request(self, names: set[str]) -> None:
         """Have these per-particle arrays ready in slot order at every update."""
@@ -56,7 +58,7 @@ class AllPairs:
             else:
                 self.fields[name] = source
 
-    def update(self, state: State) -> None:
+    def update(self, state: State, *, for_constraint: bool = False) -> None:
         """Bring the slot-ordered copies up to date."""
         self.gather(state, self.names)
 

@@ -9,7 +9,6 @@ run in the same order and a restart equals the run that was not interrupted, bit
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import io
 import json
@@ -21,8 +20,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from . import batch, validate
+from . import batch, files, validate
 from .fingerprint import difference, fingerprint
+from .incident import Incident
 from .scene import Scene
 from .settings import Settings
 
@@ -35,28 +35,72 @@ Kind = TypeVar("Kind", bound="Simulation")
 FORMAT, VERSION = "particlesim checkpoint", 1
 HEADER = "header"
 # What the arrays mean depends on these: which there are, their type, and the time of a frame.
-FIXED = ("dt", "integrator", "precision", "compensated")
+FIXED = ("dt", "integrator", "precision", "compensated", "ledger")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Capture:
+    """A checkpoint on the host; it shares nothing with the simulation."""
+
+    header: dict[str, Any]
+    arrays: dict[str, np.ndarray]
 
 
 def save(sim: Simulation, path: str | os.PathLike[str], overwrite: bool) -> None:
     """Write the present of ``sim`` (see :meth:`Simulation.save`)."""
+    target = _writable(path, overwrite)
+    _publish(target, capture(sim))
+
+
+def capture(sim: Simulation, scenes: dict[str, Any] | None = None, state: bool = True) -> Capture:
+    """Copy what a checkpoint holds.
+
+    Args:
+        sim: The simulation.
+        scenes: Its fingerprint, if it is known: it does not change.
+        state: False leaves the arrays out, for a run that is at its start.
+    """
     from . import __version__
 
-    target = _writable(path, overwrite)
-    arrays = {name: array.numpy() for name, array in contents(sim).items()}
+    held = contents(sim) if state else {}
+    arrays = {name: array.numpy().copy() for name, array in held.items()}
     header = {
         "format": FORMAT,
         "format_version": VERSION,
         "particlesim": __version__,
         "frame": sim.frame,
         "unknown_forces": sorted(sim._unknown_forces),
+        "frozen": sim.frozen,
+        "incidents": [dataclasses.asdict(incident) for incident in sim.incidents],
         "settings": dataclasses.asdict(sim.settings),
         "copies": all(scene is sim.scenes[0] for scene in sim.scenes),
-        "scenes": fingerprint(sim.scenes),
+        "scenes": fingerprint(sim.scenes) if scenes is None else scenes,
         "arrays": list(arrays),
     }
-    text = json.dumps(header, default=lambda number: number.item()).encode()
-    _publish(target, {HEADER: np.frombuffer(text, np.uint8), **arrays})
+    return Capture(header, arrays)
+
+
+def write(capture: Capture, path: Path) -> None:
+    """Write a captured checkpoint in the place of the one before; touches no simulation."""
+    _publish(path, capture)
+
+
+def read(path: Path) -> Capture:
+    """What a file holds.
+
+    Raises:
+        ValueError: It is damaged, newer or no checkpoint. OSError: It cannot be read.
+    """
+    return Capture(*_read(path))
+
+
+def restore(sim: Simulation, saved: Capture, source: Path) -> None:
+    """Put ``sim``, of the same scenes and settings, to where a checkpoint was captured."""
+    _fill(sim, saved.arrays, source)
+    sim.frame = saved.header["frame"]
+    sim._unknown_forces = set(saved.header["unknown_forces"])
+    sim.incidents = [Incident.of_saved(each) for each in saved.header.get("incidents", ())]
+    sim.watchdog.resume(sim, saved.header.get("frozen", ()))
 
 
 def load(
@@ -69,7 +113,13 @@ def load(
 ) -> Kind:
     """The simulation that a file holds (see :meth:`Simulation.load`)."""
     source = Path(path)
-    header, arrays = _read(source)
+    saved = read(source)
+    header = saved.header
+    if not saved.arrays:
+        raise validate.fail(
+            "Simulation.load", "path", "be a checkpoint with a state", str(source),
+            "this one says only how a run was started; start it anew",
+        )  # fmt: skip
     if isinstance(scene, Scene) and worlds is None and header["copies"]:
         worlds = len(header["scenes"]["worlds"])
     scenes = batch.scenes(scene, worlds)
@@ -81,9 +131,7 @@ def load(
             "give the scenes that were saved",
         )  # fmt: skip
     sim = kind(scenes, _settings(source, header["settings"], settings), device)
-    _fill(sim, arrays, source)
-    sim.frame = header["frame"]
-    sim._unknown_forces = set(header["unknown_forces"])
+    restore(sim, saved, source)
     return sim
 
 
@@ -112,6 +160,8 @@ def _settings(source: Path, saved: dict[str, Any], given: Settings | None) -> Se
         raise TypeError(
             f"Simulation.load: settings must be a Settings, got {given!r}; use Settings(...)."
         )
+    if given.automatic:
+        given = given.replace(dt=settings.dt, substeps=settings.substeps)
     for name in FIXED:
         before, now = getattr(settings, name), getattr(given, name)
         if now != before:
@@ -178,27 +228,11 @@ def _writable(path: str | os.PathLike[str], overwrite: bool) -> Path:
     return target
 
 
-def _publish(target: Path, arrays: dict[str, np.ndarray]) -> None:
-    """Write the file so that readers find the old one or the new one, never a part."""
-    temporary = target.with_name(f"{target.stem}.tmp{target.suffix}")
-    try:
-        with open(temporary, "wb") as file:
-            with zipfile.ZipFile(file, "w") as archive:
-                for name, array in arrays.items():
-                    with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
-                        np.lib.format.write_array(entry, array, allow_pickle=False)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, target)
-    except BaseException as error:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
-        if not isinstance(error, OSError):
-            raise
-        raise type(error)(
-            f"Simulation.save: {str(target)!r} must be writable, got {error}; free some space or "
-            "choose another folder. What was saved before is kept."
-        ) from error
+def _publish(target: Path, capture: Capture) -> None:
+    text = json.dumps(capture.header, default=lambda number: number.item()).encode()
+    arrays = {HEADER: np.frombuffer(text, np.uint8), **capture.arrays}
+    with files.whole("Simulation.save", target, "What was saved before is kept.") as temporary:
+        files.write_arrays(temporary, arrays, sync=True)
 
 
 def _read(source: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:

@@ -3,3 +3,7 @@
 
 class SimulationError(RuntimeError):
     """A simulation that cannot go on, with the particle, world, time and cause in the message."""
+
+
+class SimulationWarning(UserWarning):
+    """A world went wrong and the simulation goes on: what ``sim.incidents`` has, as it happens."""

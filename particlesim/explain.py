@@ -71,6 +71,8 @@ def explain(sim: Simulation) -> Explanation:
         elif isinstance(operation, Launch):
             always.append((operation.owner, kernel_name(operation), operation.dim))
     arrays = {name: a.capacity / count for name, a in sim.state.arrays.items()}
+    if sim.accounts is not None:
+        arrays["(ledger)"] = sim.accounts.memory / count
     total = sum(arrays.values()) + sum(each.memory for each in sim.neighbors.lists) / count
     chosen = sim.executor.chosen
     worlds = f"{sim.world_count} worlds of " if sim.world_count > 1 else ""

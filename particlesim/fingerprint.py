@@ -3,11 +3,13 @@
 Particles, groups, attributes, the periodic box, and of every interaction and constraint its kind,
 its particles, its tuples and the shapes of its parameters. Values are left out: positions and
 velocities come with the arrays, and a stiffness may change from one part of a run to the next.
+:func:`values` has them, for runs that are to go on to the same bits.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import re
 import zlib
 from collections.abc import Iterable, Sequence
@@ -20,7 +22,7 @@ import warp as wp
 from .interactions.base import Bindable
 from .law import Law
 from .model import select
-from .scene import Scene
+from .scene import Group, Scene
 
 ABSENT = "nothing"
 
@@ -50,13 +52,67 @@ def difference(saved: dict[str, Any], given: dict[str, Any]) -> tuple[str, Any, 
         if (ours, theirs) not in seen:
             seen.add((ours, theirs))
             where = "scene" if len(given["kinds"]) == len(saved["kinds"]) == 1 else f"scenes[{w}]"
-            found = _compare(where, saved["kinds"][ours], given["kinds"][theirs])
+            found = first_change(where, saved["kinds"][ours], given["kinds"][theirs])
             if found:
                 return found
     return None
 
 
-def _compare(where: str, saved: Any, given: Any) -> tuple[str, Any, Any] | None:
+def values(scenes: Sequence[Scene]) -> list[dict[str, Any]]:
+    """Every number and law of the scenes, as JSON; arrays by their checksums. Same bits, same runs.
+
+    Copies of one scene are described once.
+    """
+    distinct = {id(scene): scene for scene in scenes}
+    return [
+        {
+            "particles": {name: _content(scene.column(name)) for name in sorted(scene.attributes)},
+            "interactions": [_contents(part) for part in scene.interactions],
+            "constraints": [_contents(part) for part in scene.constraints],
+        }
+        for scene in distinct.values()
+    ]
+
+
+def _contents(part: Any) -> dict[str, Any]:
+    """The public attributes of an interaction, a constraint or a part of one."""
+    found = {name: _content(each) for name, each in vars(part).items() if not name.startswith("_")}
+    return {"kind": type(part).__name__, **dict(sorted(found.items()))}
+
+
+def _content(value: Any) -> Any:
+    if isinstance(value, Group):
+        return value.name
+    if isinstance(value, Law):
+        value = value.func
+    if callable(value) and hasattr(value, "__code__"):
+        return f"{value.__name__}, checksum {zlib.crc32(_source(value)):08x}"
+    if isinstance(value, dict):
+        return {str(name): _content(each) for name, each in value.items()}
+    if isinstance(value, tuple | list):
+        return [_content(each) for each in value]
+    if isinstance(value, Bindable) or dataclasses.is_dataclass(value):
+        return value.__name__ if isinstance(value, type) else _contents(value)
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return value if np.isfinite(value) else repr(value)
+    if isinstance(value, np.ndarray) and value.dtype != object:
+        digest = zlib.crc32(np.ascontiguousarray(value).tobytes())
+        return f"array of shape {value.shape}, checksum {digest:08x}"
+    return _plain(value)
+
+
+def _source(function: Any) -> bytes:
+    """The text of a function; its code where there is no text."""
+    try:
+        return inspect.getsource(function).encode()
+    except (OSError, TypeError):
+        return function.__code__.co_code + repr(function.__code__.co_consts).encode()
+
+
+def first_change(where: str, saved: Any, given: Any) -> tuple[str, Any, Any] | None:
+    """The first place where two descriptions differ, and what each has there; None: nowhere."""
     if isinstance(saved, dict) and isinstance(given, dict):
         pairs: Iterable = (
             (f"{where}.{name}", saved.get(name, ABSENT), given.get(name, ABSENT))
@@ -66,13 +122,13 @@ def _compare(where: str, saved: Any, given: Any) -> tuple[str, Any, Any] | None:
         pairs = ((f"{where}[{k}]", a, b) for k, (a, b) in enumerate(zip(saved, given, strict=True)))
     else:
         return None if saved == given else (where, _names(saved), _names(given))
-    return next((found for each in pairs if (found := _compare(*each))), None)
+    return next((found for each in pairs if (found := first_change(*each))), None)
 
 
 def _names(value: Any) -> Any:
     """Lists of interactions or constraints by their names."""
     if isinstance(value, list):
-        return [each["name"] if isinstance(each, dict) else each for each in value]
+        return [each.get("name", "...") if isinstance(each, dict) else each for each in value]
     return value
 
 

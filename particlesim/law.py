@@ -144,9 +144,11 @@ def law(func: Callable[..., Any]) -> Law:
     The body is Warp's subset of Python (``wp.sqrt``, ``wp.length``, branches, loops). Float
     literals, ``float`` and ``wp.vec3`` take the precision of the simulation, and so do the numbers
     and vectors that it names outside itself; a number that meets them is written ``2.0``, not
-    ``2``. ``int`` parameters stay whole. A law may call other laws and Warp functions. What the
-    first parameters mean is up to who uses the law (see ``PairForce``, ``ParticleForce``,
-    ``Constraint``); the others are given by keyword there.
+    ``2``. ``int`` parameters stay whole. A law may call other laws and Warp functions. A law of
+    pairs that chooses by ``wp.where``, ``wp.max``, ``wp.min`` or ``wp.clamp`` rather than by ``if``
+    runs on the CPU's vector units, its derivative too. What the first parameters mean is up to who
+    uses the law (see ``PairForce``, ``ParticleForce``, ``Constraint``); the others are given by
+    keyword there.
 
     Example:
         >>> @law

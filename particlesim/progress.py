@@ -46,7 +46,7 @@ class Meter:
                 self.last = time.perf_counter()
                 self.first = self.first or self.last
                 detail = f"{count}, {self.rate()}"
-                bar.update(task, completed=self.done, description=label, detail=detail)
+                bar.update(task, completed=frame, description=label, detail=detail)
 
             yield after_frame
 
@@ -63,6 +63,32 @@ class Meter:
         """What was done, and how fast."""
         seconds = time.perf_counter() - self.started
         return (
-            f"{self.label}: {self.frames} frames of {self.particles:,} particles in "
+            f"{self.label}: {self.done} frames of {self.particles:,} particles in "
             f"{seconds:.3g} s, {self.rate()}"
         )
+
+
+@contextlib.contextmanager
+def bar(label: str, unit: str) -> Iterator[Callable[[int, int, str], None]]:
+    """Show a bar on a terminal; yields what is called with (done, total, what is being done)."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = [
+        TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(),
+        TextColumn(unit), TimeRemainingColumn(),
+    ]  # fmt: skip
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+        task = progress.add_task(f"{label}: compiling", total=None)
+
+        def show(done: int, total: int, doing: str) -> None:
+            progress.update(task, completed=done, total=total, description=f"{label}: {doing}")
+
+        yield show

@@ -10,25 +10,33 @@ from typing import Any, Self
 import numpy as np
 import warp as wp
 
-from . import batch, checkpoint, validate
+from . import batch, checkpoint, ledger, validate
+from .access import Access
+from .accounts import Accounts
+from .assign import assign_rows, reset_worlds
 from .diagnostics import Diagnostics, measure
-from .errors import SimulationError
 from .executors import Executor
 from .explain import Explanation, explain
+from .frames import Frames, evaluate_forces
+from .incident import Incident
 from .integrators import METHODS
 from .interactions.fusion import fuse
-from .kernels.reduce import finite_kernel
-from .launch import Frame, launch, owner, record
+from .launch import owner
+from .ledger import Ledger
 from .model import Model
 from .neighbors import Neighbors
+from .observers import FINISH, FORCE, PROJECT, Observers
+from .render import Camera, Image
 from .scene import Scene
 from .settings import Settings
 from .snapshot import Snapshot
+from .stability import Stability, automatic, stability, warn_if_past
 from .state import State
+from .watchdog import Watchdog
 from .world import World
 
 
-class Simulation:
+class Simulation(Access):
     """A scene, or worlds of one kind, in motion.
 
     Args:
@@ -63,6 +71,8 @@ class Simulation:
                 f"Simulation: settings must be a Settings, got {settings!r}; use Settings(...)."
             )
         self.scenes = batch.scenes(scene, worlds)
+        if self.settings.automatic:
+            self.settings = automatic(self.scenes, self.settings, device)
         self.model = Model(self.scenes, self.settings, device)
         self.device = self.model.device
         self.frame = 0
@@ -93,32 +103,39 @@ class Simulation:
         self.neighbors.allocate(self.state)
         for part in parts:
             part.attach(model, self.state)
-        self.passes = fuse(self.interactions)
-        self._status = wp.zeros(1, dtype=wp.int32, device=self.device)
+        self.observers = Observers()
+        self.passes = self.interactions if self.settings.ledger else fuse(self.interactions)
+        self.accounts: Accounts | None = None
+        if self.settings.ledger:
+            self.accounts = Accounts(self)
+            self.observers.all.append(self.accounts)
         self.snapshot = Snapshot(self)
-        self._executor: Executor | None = None
-        self._rows_of_executor = 0
+        self.watchdog = Watchdog(model, self.neighbors)
+        self.incidents: list[Incident] = []
+        self.frames = Frames()
         self._unknown_forces = set(range(model.world_count))
 
     # The loop -------------------------------------------------------------------------------
 
     def substep(self, dt: float) -> None:
         """Advance by ``dt``: interactions, integration, constraints, velocities."""
+        self.observers.begin(dt)
         self.integrator.begin(dt)
         self.forces(dt)
         self.integrator.advance(dt)
         self.constrain(dt, self.settings.iterations)
         self.integrator.finish(dt)
         for constraint in self.constraints:
-            with owner(constraint.name):
+            with self.observers.acting(constraint, FINISH):
                 constraint.finish(self.state, self.neighbors, dt)
+        self.observers.end(dt)
 
     def forces(self, dt: float) -> None:
         """Interactions add forces at the present positions."""
         self.neighbors.update(self.state)
         self.state.clear_forces()
         for interaction in self.passes:
-            with owner(interaction.name):
+            with self.observers.acting(interaction, FORCE):
                 interaction.apply(self.state, self.neighbors, dt)
 
     def constrain(self, dt: float, iterations: int) -> None:
@@ -131,24 +148,23 @@ class Simulation:
                 constraint.begin(self.state, self.neighbors, dt)
         for _ in range(iterations):
             for constraint in self.constraints:
-                with owner(constraint.name):
+                with self.observers.acting(constraint, PROJECT):
                     constraint.project(self.state, self.neighbors, dt)
 
     def step(self) -> None:
         """Advance by one frame, ``settings.dt``.
 
         Raises:
-            SimulationError: A position or velocity is no longer finite; the message names the
-                first such particle, its world and the time. The state is the last good frame's.
+            SimulationError: The watchdog has found a world wrong, and ``settings.on_failure`` says
+                to stop, or no retry has helped. The message names the first such particle, its
+                world, the time and what did it. The state is the last good frame's.
         """
         if self.particle_count and self.settings.dt > 0:
             if self.integrator.carries_forces and self._unknown_forces:
-                self._evaluate_forces()
-            self.executor.run()
-            while self.neighbors.overflowing:
-                self._redo_with_longer_rows()
-            if self._status.numpy()[0]:
-                self._report_nonfinite()
+                evaluate_forces(self)
+            self.frames.run(self, self.settings.substeps)
+            if self.watchdog.alarmed:
+                self.watchdog.attend(self)
         self.frame += 1
 
     def run(
@@ -159,20 +175,46 @@ class Simulation:
         overwrite: bool = False,
         fields: Iterable[str] = (),
         progress: bool | Callable[[int, int], None] = False,
+        history: Any = None,
+        checkpoint: int | None = None,
+        resume: bool = False,
+        **options: Any,
     ) -> None:
         """Advance by ``frames`` frames.
 
+        A recorded run has a checkpoint beside its output, ``<stem>.checkpoint.npz``. When it was
+        ended, by whatever, call it in the same way from the same start with ``resume=True``: the
+        simulation moves to the newest checkpoint and goes on to the same frames, bit for bit.
+
         Args:
-            frames: How many, at least 0.
-            record: Path of a USD file to write the start and every frame to (see UsdRecorder).
+            frames: How many, at least 0; of a resumed run all, those that are done included.
+            record: Path to write the start and every frame to, beside the simulation: ``.usda``,
+                ``.usd`` or ``.usdc`` (UsdRecorder), ``.npz``, ``.ply``, ``.gsd`` or ``.vtkhdf``
+                (:func:`particlesim.recorders.open_recorder`).
             overwrite: Replace an existing output.
             fields: Names of further per-particle arrays to record.
             progress: True for a bar on the terminal, or a function of (frame, frames).
+            history: Path of a ``.csv`` or ``.jsonl`` file to write energies, momenta and errors of
+                the start and every frame to (see :class:`~particlesim.history.History`).
+            checkpoint: Frames from one checkpoint to the next; 0: none. None: by the clock, at
+                less than 2 % of the time.
+            resume: Go on with the run that recorded to ``record``; where there is none, start it.
+                A run that is done is left as it is.
+            **options: Of the recorder, such as ``every``, or ``color_by`` for USD.
+
+        Raises:
+            FileExistsError: The output exists. ValueError: Arguments that do not fit, or that are
+                not those that a run to be resumed was started with. OSError: A frame could not be
+                written; those before are kept.
         """
         from .run import run
 
         validate.whole("Simulation.run", "frames", frames)
-        run(self, frames, record=record, overwrite=overwrite, fields=fields, progress=progress)
+        warn_if_past(self)
+        run(
+            self, frames, record=record, progress=progress, history=history, overwrite=overwrite,
+            checkpoint=checkpoint, resume=resume, fields=tuple(fields), **options,
+        )  # fmt: skip
 
     def project(self, iterations: int) -> None:
         """Move the start positions onto the constraints, rigidly and without giving velocity.
@@ -186,73 +228,23 @@ class Simulation:
         # Without a time scale compliance is nothing: alpha / dt^2 = 0.
         self.constrain(math.inf, iterations)
         self.neighbors.grow()
-
-    def _frame(self) -> Frame:
-        """Record what a frame does."""
-        frame = Frame(repeat=self.settings.substeps)
-        with record(frame.before):
-            self.snapshot.take()
-        with record(frame.substep):
-            self.substep(self.settings.substep)
-        with record(frame.after):
-            launch(
-                finite_kernel(self.model.precision), self.particle_count,
-                [self.state.position, self.state.velocity, self._status], self.device,
-            )  # fmt: skip
-        return frame
+        self.watchdog.placed(self, range(self.world_count))
 
     @property
     def executor(self) -> Executor:
         """What runs the frames; made on first use."""
-        if self._rows_of_executor != self.neighbors.generation:
-            self.close()  # what it has recorded points to rows that were too short
-        if self._executor is None:
-            self._executor = Executor(self._frame(), self.settings, self.device)
-            self._rows_of_executor = self.neighbors.generation
-        return self._executor
-
-    def _redo_with_longer_rows(self) -> None:
-        """Nothing is ever left out of a full row: back to the start of the frame, and again."""
-        self.neighbors.lengthen()
-        self.snapshot.restore()
-        self._status.zero_()
-        self.executor.run()
-
-    def _evaluate_forces(self) -> None:
-        """The forces that a first kick starts from, in the worlds where they are not known."""
-        state, known = self.state, set(range(self.world_count)) - self._unknown_forces
-        before = state.force.numpy().copy() if known and "force" in state else None
-        self.forces(self.settings.substep)
-        if self.neighbors.grow():
-            self.forces(self.settings.substep)
-        if before is not None:
-            # Forces that depend on velocity would not come out as they were within the step.
-            force, keep = state.force.numpy().copy(), np.isin(self.model.world_of, list(known))
-            force[keep] = before[keep]
-            state.force.assign(force)
-        self._unknown_forces.clear()
+        return self.frames.executor(self, self.settings.substeps)
 
     def close(self) -> None:
         """Let go of graphs and threads; the next step makes them anew."""
-        if self._executor is not None:
-            self._executor.close()
-            self._executor = None
-
-    def _report_nonfinite(self) -> None:
-        x, v = self.position, self.velocity  # copies: the state is about to be restored
-        bad = ~(np.isfinite(x).all(axis=1) & np.isfinite(v).all(axis=1))
-        row = int(np.argmax(bad)) if bad.any() else 0
-        world = int(self.model.world_of[row])
-        particle = row - int(self.model.offsets[world])
-        self.snapshot.restore()
-        self._status.zero_()
-        raise SimulationError(
-            f"Simulation: position and velocity must stay finite, got x = {x[row]}, v = {v[row]} "
-            f"of particle {particle} in world {world} between t = {self.time:g} and "
-            f"{self.time + self.settings.dt:g}; use more substeps, or look at what pushes it."
-        )
+        self.frames.close()
 
     # Reading and writing --------------------------------------------------------------------
+
+    @property
+    def frozen(self) -> list[int]:
+        """Worlds that stand still since the watchdog froze them; :meth:`reset` frees them."""
+        return sorted(self.watchdog.frozen)
 
     @property
     def world_count(self) -> int:
@@ -269,66 +261,13 @@ class Simulation:
         """Simulated time since the start [s]."""
         return self.frame * self.settings.dt
 
-    @property
-    def position(self) -> np.ndarray:
-        """Positions of all worlds, (n, 3), a copy on the host."""
-        return self.get("position")
-
-    @position.setter
-    def position(self, value: Any) -> None:
-        self.set("position", value)
-
-    @property
-    def velocity(self) -> np.ndarray:
-        """Velocities of all worlds, (n, 3), a copy on the host."""
-        return self.get("velocity")
-
-    @velocity.setter
-    def velocity(self, value: Any) -> None:
-        self.set("velocity", value)
-
     def get(self, name: str) -> np.ndarray:
         """A per-particle array, copied to the host."""
         return self.state[name].numpy().copy()
 
     def set(self, name: str, value: Any, rows: slice = slice(None)) -> None:
         """Write a per-particle array, or rows of it; what was derived from it is forgotten."""
-        array = self.state[name]
-        host = array.numpy().copy()
-        shape = host[rows].shape
-        width = shape[1] if len(shape) == 2 else None
-        host[rows] = validate.rows("Simulation.set", name, value, shape[0], width)
-        if name == "mass":
-            self._invert(host, rows)
-        if name == "radius" and host.max() > self.model.column("radius").max():
-            raise validate.fail(
-                "Simulation.set", "radius", "be at most the largest at the start, which contacts "
-                f"are looked for by ({self.model.column('radius').max():g})", float(host.max()),
-                "give the scene the largest radius it will have",
-            )  # fmt: skip
-        array.assign(host)
-        error = f"{name}_error"
-        if error in self.state:
-            kept = self.state[error].numpy().copy()
-            kept[rows] = 0
-            self.state[error].assign(kept)
-        worlds = np.unique(self.model.world_of[rows]).tolist()
-        if name == "position":
-            self.neighbors.renew(self.state, worlds)
-            for constraint in self.constraints:
-                constraint.placed(worlds)
-        self._unknown_forces.update(worlds)
-
-    def _invert(self, mass: np.ndarray, rows: slice) -> None:
-        """Have the inverse masses follow the masses; pinned particles stay pinned."""
-        if not (mass[rows] > 0).all():
-            raise validate.fail(
-                "Simulation.set", "mass", "be above 0", float(mass[rows].min()), "give a mass"
-            )
-        if "inverse_mass" in self.state:
-            inverse = self.get("inverse_mass")
-            inverse[rows] = np.where(inverse[rows] > 0, 1.0 / mass[rows], 0.0)
-            self.state.inverse_mass.assign(inverse)
+        assign_rows(self, name, value, rows)
 
     def world(self, index: int) -> World:
         """A view of one world."""
@@ -337,25 +276,10 @@ class Simulation:
     def reset(self, worlds: Iterable[int] | None = None) -> None:
         """Put worlds (None: all) back to their start, with nothing left of what they went through.
 
-        A world that is reset goes as it went the first time; the others go on untouched.
+        A world that is reset goes as it went the first time, also if it was frozen; the others go
+        on untouched.
         """
-        owner, count = "Simulation.reset", self.world_count
-        given = range(count) if worlds is None else worlds
-        given = given if isinstance(given, Iterable) else [given]
-        chosen = sorted({validate.whole(owner, "worlds", w) for w in given})
-        if chosen and chosen[-1] >= count:
-            raise validate.fail(
-                owner, "worlds", f"be from 0 to {count - 1}", chosen[-1],
-                "name worlds of this simulation",
-            )  # fmt: skip
-        if len(chosen) == count:
-            self.frame = 0
-        self.state.reset(chosen)
-        self._status.zero_()
-        self.neighbors.renew(self.state, chosen)
-        for part in [*self.interactions, *self.constraints]:
-            part.reset(chosen)
-        self._unknown_forces.update(chosen)
+        reset_worlds(self, worlds)
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write a checkpoint: all that is needed to go on from here, bit for bit.
@@ -397,9 +321,60 @@ class Simulation:
         """
         return checkpoint.load(cls, path, scene, settings, device, worlds)
 
+    def render(
+        self,
+        path: str | os.PathLike[str] | None = None,
+        width: int = 1280,
+        height: int = 720,
+        camera: Camera | None = None,
+        color: str | None = None,
+        **options: Any,
+    ) -> Image:
+        """A picture of the present state, with the colours and boundaries of recordings.
+
+        Args:
+            path: File to write too, ``.png``, ``.jpg`` or ``.webp``.
+            width: In pixels.
+            height: In pixels.
+            camera: None: one that sees all.
+            color: Name of a value to colour particles by, as ``color_by`` of
+                :class:`~particlesim.record.UsdRecorder`; None: each group has its own colour.
+            **options: ``color_map``, ``color_range``, ``worlds``, ``groups``, ``layout`` and
+                ``surface`` as of UsdRecorder, but worlds stand side by side; ``ground``: True,
+                False or a height [length], None: where there are boundaries; ``background``
+                (linear r, g, b), ``shadows``, ``occlusion``, ``supersample`` (1, 2 or 4) and
+                ``overwrite``.
+
+        Raises:
+            ValueError: Values out of range, names that are not there, another suffix.
+            FileExistsError: The file exists, and ``overwrite`` is not set.
+            ImportError: Pillow, which writes files, is not installed.
+        """
+        from .render.preview import render
+
+        return render(self, path, width, height, camera, color, **options)
+
+    def _repr_png_(self) -> bytes | None:
+        """A picture for notebooks, where Pillow is installed."""
+        from .render.preview import notebook_picture
+
+        return notebook_picture(self)
+
+    def stability(self) -> Stability:
+        """The largest safe substep of every part at the present moment, and what binds."""
+        return stability(self)
+
     def diagnostics(self) -> Diagnostics:
         """Conserved quantities of every world at the present time."""
         return measure(self)
+
+    def ledger(self) -> Ledger:
+        """Work and impulse of every interaction and constraint since the start, world by world.
+
+        Raises:
+            ValueError: ``settings.ledger`` is not set.
+        """
+        return ledger.read(self)
 
     def explain(self) -> Explanation:
         """What is allocated, compiled and launched, and why."""

@@ -37,6 +37,9 @@ class Snapshot:
         for k, constraint in enumerate(sim.constraints):
             for name, array in constraint.persistent().items():
                 self.arrays[f"constraint_{k}_{name}"] = array
+        if sim.accounts is not None:
+            for name, array in sim.accounts.persistent().items():
+                self.arrays[f"ledger_{name}"] = array
         self.copies = {name: wp.clone(array) for name, array in self.arrays.items()}
 
     def take(self) -> None:

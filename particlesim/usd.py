@@ -21,7 +21,7 @@ from typing import Any, Self
 
 from pxr import Sdf, Tf
 
-from . import usd_clips, usd_stage, validate
+from . import files, usd_clips, usd_stage, validate
 from .usd_frame import Frame, FrameChecker, field_kinds
 from .usd_info import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
 from .usd_resume import take_up
@@ -202,7 +202,7 @@ class UsdWriter:
         self.overwrite = True  # from here on, what exists is this recording's own
         # The old root goes first: it must not lead readers to a mixture of old and new frames.
         self.path.unlink(missing_ok=True)
-        self.clips.mkdir(exist_ok=True)
+        files.make_folder("UsdRecorder", self.clips)
         for stale in [*self.clips.glob("f.*.usdc"), *self.clips.glob("manifest.*usda")]:
             stale.unlink()
         clouds = [frame.x[rows] for rows, _ in frame.clouds]

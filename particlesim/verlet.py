@@ -32,32 +32,36 @@ class VerletList(AllPairs):
 
     partners = ROWS
 
-    def __init__(self, model: Model, members: np.ndarray, cutoff: np.ndarray):
+    def __init__(self, model: Model, members: np.ndarray):
         super().__init__(model, members)
-        self.cutoff = cutoff
-        sizes = self.end_host - self.begin_host
-        limit = DIRECT_CPU if model.device.is_cpu else DIRECT_CUDA
-        self.grid_worlds = [int(w) for w in np.nonzero(sizes > limit)[0]]
-        small = (sizes > 0) & (sizes <= limit)
-        self.has_direct = bool(small.any())
-        self.direct = model.array(small, wp.int32)
-        self.sorted = self.sorted or bool(self.grid_worlds)
+        self.cutoff = np.zeros(model.world_count)  # 0: nothing is looked for in that world
         self.capacity = self.generation = 0
         self.grids: dict[int, tuple[wp.HashGrid, Any]] = {}
 
-    def widen(self, cutoff: np.ndarray) -> None:
-        """Serve a larger cutoff too."""
-        self.cutoff = np.maximum(self.cutoff, cutoff)
+    def _choose_search(self) -> None:
+        """Which worlds have a grid, and which are looked through directly."""
+        sizes = (self.end_host - self.begin_host) * (self.cutoff > 0)
+        limit = DIRECT_CPU if self.model.device.is_cpu else DIRECT_CUDA
+        self.grid_worlds = [int(w) for w in np.nonzero(sizes > limit)[0]]
+        small = (sizes > 0) & (sizes <= limit)
+        self.has_direct = bool(small.any())
+        self.direct = self.model.array(small, wp.int32)
+        self.sorted = self.sorted or bool(self.grid_worlds)
 
     def allocate(self, state: State) -> None:
         model, device = self.model, self.model.device
         real, vec3 = model.precision.scalar, model.precision.vec3
         self._check_box()
+        self._choose_search()
         given = model.settings.skin
         skin = self.cutoff * SKIN if given is None else np.full_like(self.cutoff, given)
-        self.reach = self.cutoff + skin
+        self.reach = np.where(self.cutoff > 0, self.cutoff + skin, np.inf)
         # A hair less than half the skin, for the rounding of the distances compared.
-        self.margin_squared = model.array((0.4999 * skin) ** 2, real)
+        margins = [
+            np.where(renewed, (0.4999 * skin) ** 2, np.inf)
+            for renewed in (self.for_interactions, self.for_constraints)
+        ]
+        self.margins_squared = [model.array(each, real) for each in margins]
         self.reach_squared = model.array(self.reach**2, real)
         self.order = wp.clone(self.members)
         self.slot = wp.zeros(self.count, dtype=wp.int32, device=device)
@@ -146,15 +150,15 @@ class VerletList(AllPairs):
             self.moved[w : w + 1].fill_(1)
         self.any_moved.fill_(1)
 
-    def update(self, state: State) -> None:
+    def update(self, state: State, *, for_constraint: bool = False) -> None:
         """Rebuild the rows of worlds in which something moved, and the slot-ordered copies."""
         model, device = self.model, self.model.device
         flag = kernels.moved_kernel(model.precision, model.periodic)
         launch(
             flag,
             self.count,
-            [self.members, self.world, model.box, self.margin_squared, state.position,
-             self.x_listed, self.moved, self.any_moved],
+            [self.members, self.world, model.box, self.margins_squared[for_constraint],
+             state.position, self.x_listed, self.moved, self.any_moved],
             device,
         )  # fmt: skip
         with when(self.any_moved):
@@ -245,8 +249,9 @@ class VerletList(AllPairs):
         how = f"hash grid {grids[0]}" if grids else "direct search"
         how += f" and {len(grids) - 1} more" if len(grids) > 1 else ""
         mean = np.minimum(self.pairs.count.numpy(), self.capacity).sum() / max(1, self.count)
+        reach = self.reach[self.cutoff > 0].max(initial=0.0)
         return (
-            f"within {self.reach.max():g} of {self.count} particles, {mean:.0f} neighbours on "
+            f"within {reach:g} of {self.count} particles, {mean:.0f} neighbours on "
             f"average, room for {self.capacity}, {how}, for {', '.join(self.users)}"
         )
 

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import validate
+from .access import Access
 from .scene import Scene
 
 if TYPE_CHECKING:
     from .simulation import Simulation
 
 
-class World:
+class World(Access):
     """One world of a batch: its rows of the simulation's arrays."""
 
     def __init__(self, sim: Simulation, index: int):
@@ -32,27 +33,13 @@ class World:
         """The scene that the world was made of."""
         return self.sim.scenes[self.index]
 
-    @property
-    def position(self) -> np.ndarray:
-        """Positions, (n, 3), a copy on the host."""
-        return self.get("position")
-
-    @position.setter
-    def position(self, value: Any) -> None:
-        self.sim.set("position", value, self.rows)
-
-    @property
-    def velocity(self) -> np.ndarray:
-        """Velocities, (n, 3), a copy on the host."""
-        return self.get("velocity")
-
-    @velocity.setter
-    def velocity(self, value: Any) -> None:
-        self.sim.set("velocity", value, self.rows)
-
     def get(self, name: str) -> np.ndarray:
         """A per-particle array of this world, copied to the host."""
         return self.sim.state[name][self.rows].numpy().copy()
+
+    def set(self, name: str, value: Any) -> None:
+        """Write a per-particle array of this world."""
+        self.sim.set(name, value, self.rows)
 
     def reset(self) -> None:
         """Put this world back to its start."""

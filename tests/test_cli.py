@@ -1,5 +1,8 @@
 """The command line, with a stand-in for the engine, and at the end with the engine itself."""
 
+import os
+import subprocess
+import sys
 import textwrap
 from pathlib import Path
 
@@ -38,8 +41,10 @@ class Engine:
         Engine.last = self
         self.scene, self.settings, self.device, self.worlds = scene, settings, device, worlds
 
-    def run(self, frames, record, progress, overwrite, fields):
+    def run(self, frames, record, progress, overwrite, fields, history, checkpoint, resume):
+        self.checkpoint, self.resume = checkpoint, resume
         self.frames, self.record, self.overwrite = frames, record, overwrite
+        self.history = history
         self.fields = tuple(fields)
         for frame in range(1, frames + 1):
             progress(frame, frames)
@@ -87,11 +92,12 @@ def particlesim_fails(capsys):
 def test_run_passes_everything_on(engine, scene_file, tmp_path, capsys):
     out = str(tmp_path / "out.usda")
     arguments = ["--frames", "5", "--out", out, "--device", "cpu", "--worlds", "3"]
-    arguments += ["--field", "density", "--field", "pressure"]
+    arguments += ["--field", "density", "--field", "pressure", "--checkpoint-every", "7"]
     assert cli.main(["run", scene_file(), *arguments]) == 0
     sim = engine.last
     assert (sim.frames, sim.record, sim.overwrite) == (5, out, False)
     assert sim.fields == ("density", "pressure")
+    assert (sim.checkpoint, sim.resume) == (7, False)
     assert (sim.device, sim.worlds, sim.settings.substeps) == ("cpu", 3, 4)
     output = capsys.readouterr()
     assert output.err == ""
@@ -355,6 +361,36 @@ def test_run_writes_usd(scene_file, tmp_path, capsys):
     assert float(summary.partition("error ")[2].split(";")[0]) < 1e-13
     # The start and two frames.
     assert out.is_file() and len(list((tmp_path / "falling.clips").glob("f.*.usdc"))) == 3
+
+
+def test_a_run_is_resumed(scene_file, tmp_path, capsys, particlesim_fails):
+    path, out = scene_file(FALLING, "falling.py"), str(tmp_path / "falling.npz")
+    words = ["run", path, "--out", out, "--device", "cpu"]
+    assert cli.main([*words, "--frames", "1", "--resume"]) == 0
+    told = capsys.readouterr()
+    assert told.err == f"note: nothing to resume at {out}; starting it\n" and "1 frames" in told.out
+    assert "go on with --resume" in particlesim_fails(2, *words, "--frames", "3")
+    assert cli.main([*words, "--frames", "3", "--resume"]) == 0
+    assert capsys.readouterr().out.startswith("falling: 2 frames of 1 particles")
+    assert cli.main([*words, "--frames", "3", "--resume"]) == 0
+    assert f"all 3 frames are in {out}, nothing was left" in capsys.readouterr().out
+    line = particlesim_fails(2, *words, "--set", "height=11", "--resume")
+    assert "start.state must be" in line or "position must be" in line
+    assert "--out" in particlesim_fails(2, "run", path, "--resume")
+    assert "--overwrite" in particlesim_fails(2, *words, "--resume", "--overwrite")
+
+
+def test_a_reader_that_has_enough_ends_the_program_quietly():
+    # As in "particlesim list | head -1", whatever of it comes first.
+    reading, writing = os.pipe()
+    os.close(reading)
+    program = [sys.executable, "-c", "from particlesim import cli; raise SystemExit(cli.main())"]
+    done = subprocess.run(
+        [*program, "list"], stdout=writing, stderr=subprocess.PIPE, text=True, check=False,
+        timeout=100,
+    )  # fmt: skip
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_run_refuses_a_device_that_is_not_there(scene_file, particlesim_fails):

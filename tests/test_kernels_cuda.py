@@ -14,9 +14,12 @@ import warp as wp
 
 import particlesim as ps
 from particlesim import kernels, launch
+from particlesim.frames import record_frame
+from particlesim.history_sample import sample
 from particlesim.kernels.precision import KERNELS
 from particlesim.launch import Launch, Program
 from particlesim.model import Model
+from particlesim.render import renderer  # noqa: F401 - its kernels are to be compiled too
 from particlesim.scene_files import load_scene, ready_scenes
 
 ARCH = 90
@@ -101,6 +104,7 @@ def constrained(periodic, *, breaks, bounces):
     if periodic is None:
         scene.add_constraint(ps.PlaneBoundary((0, -9, 0), (0, 1, 0), **touch))
         scene.add_constraint(ps.BoxBoundary((-9, -9, -9), (20, 20, 20), **touch))
+        scene.add_constraint(ps.SphereBoundary((0, 0, 0), 30.0, velocity=(1, 0, 0), **touch))
     return scene
 
 
@@ -143,8 +147,8 @@ def launched(monkeypatch):
 def simulate(name, precision):
     build, knobs = SCENES[name]
     sim = ps.Simulation(build(), ps.Settings(precision=precision, **knobs), device="cpu")
-    sim._frame()
-    sim.diagnostics()
+    record_frame(sim, sim.settings.substeps)
+    sample(sim)
     sim.project(1)
     for interaction in sim.interactions:
         if isinstance(interaction, ps.SPH):
@@ -181,7 +185,9 @@ def test_every_kernel_compiles(precision, launched, tmp_path):
     # All variants in float32, 0.15 s a kernel; in float64 one variant of each kernel at least.
     for name in SCENES if precision == "float32" else EVERY_KERNEL:
         simulate(name, precision)
-    found = list(launched.values())
+    # What draws is not part of a simulation; its kernels are made when their module is imported.
+    drawing = {kernel.module.name: kernel for kernel in KERNELS if "__locals__" not in kernel.key}
+    found = list((launched | drawing).values())
     misplaced = [kernel.key for kernel in found if kernel not in KERNELS]
     assert not misplaced, "these would be launched on CUDA, but are for the CPU only"
     assert registered() - {kernel.key.rpartition("__")[2] for kernel in found} == set()

@@ -10,6 +10,7 @@ import warp as wp
 import particlesim as ps
 from particlesim import launch
 from particlesim.executors import EagerExecutor, GraphExecutor, ThreadExecutor
+from particlesim.frames import evaluate_forces
 from particlesim.launch import CHUNK, Frame, Launch, Program, When
 from particlesim.threads import Chain, Team
 
@@ -42,7 +43,7 @@ def test_the_same_bits_whichever_way(melt, method):
     eager = melt("graph", None, integrator=method)
     eager.executor.chosen = EagerExecutor(eager.executor.frame)
     if method == "velocity_verlet":
-        eager._evaluate_forces()
+        evaluate_forces(eager)
     for _ in range(6):
         eager.executor.run()
     reference = eager.position, eager.velocity, eager.diagnostics().potential
@@ -92,7 +93,10 @@ def test_rows_that_grow_within_a_run(execution, threads):
     scene = ps.Scene()
     scene.add_particles(x, velocity=-x)
     scene.add_interaction(ps.LennardJones(epsilon=1e-3, sigma=0.3, cutoff=2.0))
-    settings = ps.Settings(dt=0.03, substeps=2, execution=execution, threads=threads)
+    # Random points overlap, and some pairs part at nonsensical speeds: not the subject here.
+    settings = ps.Settings(
+        dt=0.03, substeps=2, execution=execution, threads=threads, watchdog=False
+    )
     sim = ps.Simulation(scene, settings, device="cpu")
     before = sim.neighbors.lists[0].capacity
     sim.run(15)
@@ -245,6 +249,7 @@ def test_a_substep_does_not_wait_for_the_host(melt, monkeypatch):
     )
     sim.step()
     reads.clear()
-    sim.run(4)
-    # Once a frame: is it finite, was a row full.
-    assert len(reads) == 4 * 2
+    for _ in range(4):
+        sim.step()
+    # Once a frame: was a row full. The watchdog's flag is looked at in place, on the CPU.
+    assert len(reads) == 4

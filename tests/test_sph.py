@@ -309,7 +309,10 @@ def test_threads_and_graph_agree_bit_for_bit():
     x, v, m = cloud(3000)
     results = []
     for execution, threads in [("graph", 1), ("threads", 1), ("threads", 2)]:
-        settings = ps.Settings(dt=0.002, substeps=4, execution=execution, threads=threads)
+        # A random cloud bursts at speeds that depend on the step, whichever way it is run.
+        settings = ps.Settings(
+            dt=0.002, substeps=4, execution=execution, threads=threads, watchdog=False
+        )
         scene = fluid(x, v, m, viscosity=ps.ArtificialViscosity(0.5))
         sim = ps.Simulation(scene, settings, device="cpu")
         sim.run(2)

@@ -230,7 +230,8 @@ def test_rows_grow_for_one_world_only_in_cost(device):
         scene.add_interaction(ps.LennardJones(epsilon=1e-3, sigma=0.3, cutoff=2.0))
         return scene
 
-    settings = ps.Settings(dt=0.02, substeps=2)
+    # Random points overlap, and some pairs part at nonsensical speeds: not the subject here.
+    settings = ps.Settings(dt=0.02, substeps=2, watchdog=False)
     batch = ps.Simulation([build(0.01), build(1.5)], settings, device=device)
     before = batch.neighbors.lists[0].capacity
     batch.run(20)

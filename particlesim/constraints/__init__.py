@@ -1,6 +1,6 @@
 """Constraints: what projects positions after integration."""
 
-from .boundary import BoxBoundary, PlaneBoundary
+from .boundary import BoxBoundary, PlaneBoundary, SphereBoundary
 from .constraint import Constraint
 from .contact import Contact
 from .distance import Distance
@@ -13,4 +13,5 @@ __all__ = [
     "Contact",
     "Distance",
     "PlaneBoundary",
+    "SphereBoundary",
 ]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..interactions.base import Bindable
 
 if TYPE_CHECKING:
@@ -12,6 +14,7 @@ if TYPE_CHECKING:
 
     from ..model import Model
     from ..neighbors import Neighbors
+    from ..stability import Limit, Probe
     from ..state import State
 
 
@@ -24,6 +27,7 @@ class ConstraintBase(Bindable):
     """
 
     requires: frozenset[str] = frozenset()
+    model: Model  # once prepared
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         """Once: merge the worlds' tuples and parameters, request neighbours."""
@@ -42,6 +46,10 @@ class ConstraintBase(Bindable):
     def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
         """After the velocities have followed: restitution, breaking. Launches only."""
 
+    def limits(self, probe: Probe) -> list[Limit]:
+        """Bounds on the substep at the present state (see ``Simulation.stability``)."""
+        return []
+
     def persistent(self) -> dict[str, wp.array]:
         """Arrays that outlive a substep, for snapshots and checkpoints."""
         return {}
@@ -49,6 +57,13 @@ class ConstraintBase(Bindable):
     def readable(self) -> dict[str, wp.array]:
         """Arrays of the last substep that users can read something from, for checkpoints."""
         return {}
+
+    def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
+        """The world of each row of one of these arrays; None: its rows are no world's own."""
+        model = self.model
+        if len(array) == model.particle_count:
+            return model.world_of
+        return np.arange(model.world_count) if len(array) == model.world_count else None
 
     def reset(self, worlds: Sequence[int]) -> None:
         """Forget what these worlds have left behind."""

@@ -1,127 +1,33 @@
-"""Boundaries that particles stay inside of: planes and boxes."""
+"""Boundaries that hold particles off by their radius: planes, boxes and spheres."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import warp as wp
 
 from .. import validate
-from ..kernels import boundary as kernels
-from ..launch import call, launch
-from .base import ConstraintBase
-from .easing import Easing
-from .tuples import bodies
+from ..kernels import boundary_shapes
+from .boundary_base import STILL, Boundary
 
 if TYPE_CHECKING:
     from ..model import Model
-    from ..neighbors import Neighbors
-    from ..state import State
-
-
-class Boundary(ConstraintBase):
-    """Base of boundaries: a member is its geometry, its kernels and the type of their state.
-
-    Particles are held off by their radius, C >= 0 with nothing to soften it. Friction takes back
-    the tangential way of the substep, up to mu times the normal correction (Macklin et al. 2014,
-    eq. 24); restitution sets the normal velocity after the solve (Mueller et al. 2020, eq. 34).
-    What starts outside is brought in at no more than ``Settings.depenetration_speed``.
-    """
-
-    requires = frozenset({"position", "velocity", "inverse_mass", "radius", "correction"})
-    geometry: tuple[str, ...]  # attributes that go into the kernels' parameters
-
-    def __init__(self, friction: float, restitution: float, group: Any):
-        self.group = group
-        self.friction = validate.number(self.name, "friction", friction, minimum=0.0)
-        self.restitution = validate.number(
-            self.name, "restitution", restitution, minimum=0.0, maximum=1.0
-        )
-
-    def _kernels(self, *shape: Any) -> tuple[wp.Kernel, wp.Kernel, wp.Kernel]:
-        """Start of a substep, projection, bounce."""
-        raise NotImplementedError
-
-    def _each(self, model: Model) -> Any:
-        """Type of slack and grip: one number, or one an axis."""
-        return model.precision.scalar
-
-    def _check(self, model: Model, w: int) -> None:
-        """The geometry is fit for world w."""
-
-    def prepare(self, model: Model, neighbors: Neighbors) -> None:
-        self.model = model
-        for w, peer in enumerate(self.peers):
-            peer._check(model, w)
-        members = model.members([peer.group for peer in self.peers], self.name)
-        self.count = len(members)
-        self.held = kernels.held_type(model.precision, self._each(model))()
-        self.held.particle = model.array(members, wp.int32)
-        self.held.world = model.array(model.world_of[members], wp.int32)
-        names = (*self.geometry, "friction", "restitution")
-        columns = {name: np.array([getattr(peer, name) for peer in self.peers]) for name in names}
-        self.Params, self.params = model.parameters(f"{type(self).__name__}Parameters", columns)
-        self.rough, self.bouncing = (bool(columns[name].any()) for name in names[-2:])
-
-    def attach(self, model: Model, state: State) -> None:
-        if not self.count:
-            return
-        each, device = self._each(model), model.device
-        self.bodies = bodies(model, state)
-        self.easing = Easing(model, self.count, each, ends=1)
-        self.held.radius = state.radius
-        self.held.slack, self.held.marked = self.easing.slack, self.easing.marked
-        if self.rough:
-            self.held.grip = wp.zeros(self.count, dtype=each, device=device)
-        forces = "force" in state
-        vec3 = model.precision.vec3
-        self.force = state.force if forces else wp.empty(0, dtype=vec3, device=device)
-        self.start, self.push, self.bounce = self._kernels(
-            model.precision, self.Params, "position_error" in state, forces
-        )
-
-    def _launch(self, kernel: wp.Kernel, *inputs: Any) -> None:
-        everything = [self.params, self.held, self.bodies, *inputs]
-        launch(kernel, self.count, everything, self.model.device)
-
-    def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        # A static projection goes by the radii as they are, and leaves the marks to the first step.
-        if self.count and 0 < dt < math.inf:
-            self._launch(self.start, self.easing.struct, dt)
-            call(self.easing.unmark)
-
-    def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        if self.count and dt > 0:
-            moving = dt < math.inf
-            self._launch(self.push, float(moving), dt if moving else 0.0)
-
-    def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        if self.count and self.bouncing and dt > 0:
-            self._launch(self.bounce, self.force, dt, 1.0 / dt)
-
-    def persistent(self) -> dict[str, wp.array]:
-        return self.easing.persistent() if self.count else {}
-
-    def reset(self, worlds: Sequence[int]) -> None:
-        self.placed(worlds)
-
-    def placed(self, worlds: Iterable[int]) -> None:
-        if self.count:
-            self.easing.mark(worlds)
+    from ..stability import Limit, Probe
 
 
 class PlaneBoundary(Boundary):
     """The half space (x - point) . n >= R, on the side that the normal points to.
 
     Args:
-        point: A point of the plane [length], (3,).
+        point: A point of the plane [length], (3,); it turns about this one.
         normal: n, into the half space that is open to particles, (3,); any length but 0.
         friction: mu, at least 0.
-        restitution: e, 0 to 1: speed after over speed before.
+        restitution: e, 0 to 1: speed after over speed before, both against the plane's.
         group: Which particles it holds; None: all.
+        velocity: Of the plane, (3,) [length/time]: along the normal a piston, across it a
+            conveyor belt, which stays where it is.
+        angular_velocity: About the point, (3,) [rad/time]: along the normal a turntable.
 
     Raises:
         ValueError: Values out of range; a normal along a periodic axis.
@@ -130,8 +36,12 @@ class PlaneBoundary(Boundary):
         >>> ground = PlaneBoundary((0, 0, 0), (0, 2, 0), friction=0.5)
         >>> ground.normal.tolist()
         [0.0, 1.0, 0.0]
+        >>> piston = PlaneBoundary((0, 0, 0), (0, 1, 0), velocity=(0, 0.5, 0))
+        >>> piston.pose(time=2.0)[0].tolist()
+        [0.0, 1.0, 0.0]
     """
 
+    shape = boundary_shapes.PLANE
     geometry = ("point", "normal")
 
     def __init__(
@@ -141,8 +51,11 @@ class PlaneBoundary(Boundary):
         friction: float = 0.0,
         restitution: float = 0.0,
         group: Any = None,
+        *,
+        velocity: Sequence[float] = STILL,
+        angular_velocity: Sequence[float] = STILL,
     ):
-        super().__init__(friction, restitution, group)
+        super().__init__(friction, restitution, group, velocity, angular_velocity)
         self.point = validate.vector(self.name, "point", point, unit="length")
         given = validate.vector(self.name, "normal", normal)
         longest = np.abs(given).max()
@@ -154,13 +67,22 @@ class PlaneBoundary(Boundary):
         self.normal = scaled / np.linalg.norm(scaled)
 
     def shapes(self) -> list[dict[str, Any]]:
-        return [{"kind": "plane", "point": self.point, "normal": self.normal}]
+        return [self._drawn("plane", point=self.point, normal=self.normal)]
 
-    def _kernels(self, *shape: Any) -> tuple[wp.Kernel, wp.Kernel, wp.Kernel]:
-        return kernels.plane_kernels(*shape)
+    def _pivot(self) -> np.ndarray:
+        return self.point
+
+    def _carried(self) -> tuple[np.ndarray, np.ndarray]:
+        n = self.normal
+        if np.cross(n, self.angular_velocity).any():
+            return self.velocity, self.angular_velocity
+        return n * (n @ self.velocity), np.zeros(3)
 
     def _check(self, model: Model, w: int) -> None:
-        if any(on and n != 0 for on, n in zip(model.periodic, self.normal, strict=True)):
+        turn = self._carried()[1]
+        aside = np.cross(turn, self.normal)
+        swept = np.array([self.normal, aside, np.cross(turn, aside)])  # the normals that it takes
+        if swept[:, list(model.periodic)].any():
             raise validate.fail(
                 self.name, "normal", "be along the open axes of a periodic scene", self.normal,
                 "leave that axis open",
@@ -174,18 +96,24 @@ class BoxBoundary(Boundary):
         lower: Lower corner [length], (3,); -inf leaves a side open.
         upper: Upper corner [length], (3,), above the lower; inf leaves a side open.
         friction: mu of all sides, at least 0.
-        restitution: e, 0 to 1: speed after over speed before.
+        restitution: e, 0 to 1: speed after over speed before, both against the side's.
         group: Which particles it holds; None: all.
+        velocity: Of the box, (3,) [length/time].
+        angular_velocity: About its middle, (3,) [rad/time]; only of a box without open sides.
 
     Raises:
-        ValueError: Values out of range; a side on a periodic axis.
+        ValueError: Values out of range; a side on a periodic axis; an open box that turns.
 
     Example:
         >>> pool = BoxBoundary((0, 0, 0), (4, float("inf"), 1))
         >>> pool.upper.tolist()
         [4.0, inf, 1.0]
+        >>> mill = BoxBoundary((-1, -1, -1), (1, 1, 1), friction=0.5, angular_velocity=(0, 0, 2))
+        >>> mill.pose(time=np.pi / 4)[1].round(6).tolist()
+        [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     """
 
+    shape = boundary_shapes.BOX
     geometry = ("lower", "upper")
 
     def __init__(
@@ -195,14 +123,23 @@ class BoxBoundary(Boundary):
         friction: float = 0.0,
         restitution: float = 0.0,
         group: Any = None,
+        *,
+        velocity: Sequence[float] = STILL,
+        angular_velocity: Sequence[float] = STILL,
     ):
-        super().__init__(friction, restitution, group)
+        super().__init__(friction, restitution, group, velocity, angular_velocity)
         self.lower = self._corner("lower", lower, -np.inf)
         self.upper = self._corner("upper", upper, np.inf)
         if not (self.lower < self.upper).all():
             raise validate.fail(
                 self.name, "upper", f"be above lower {self.lower.tolist()} [length]", self.upper,
                 "swap the corners",
+            )  # fmt: skip
+        closed = np.isfinite(self.lower) & np.isfinite(self.upper)
+        if self.angular_velocity.any() and not closed.all():
+            raise validate.fail(
+                self.name, "angular_velocity", "be 0 where sides are open, as there is no middle",
+                self.angular_velocity, "close the box, or turn planes",
             )  # fmt: skip
 
     def _corner(self, name: str, value: Any, open_side: float) -> np.ndarray:
@@ -214,13 +151,22 @@ class BoxBoundary(Boundary):
         return np.where(opened, open_side, corner)
 
     def shapes(self) -> list[dict[str, Any]]:
-        return [{"kind": "box", "lower": self.lower, "upper": self.upper}]
+        return [self._drawn("box", lower=self.lower, upper=self.upper)]
 
-    def _kernels(self, *shape: Any) -> tuple[wp.Kernel, wp.Kernel, wp.Kernel]:
-        return kernels.box_kernels(*shape)
+    def limits(self, probe: Probe) -> list[Limit]:
+        """By the speed of the particles against the width; half spaces are never passed through."""
+        from ..stability.solids import box_limits
 
-    def _each(self, model: Model) -> Any:
-        return model.precision.vec3
+        return box_limits(self, probe)
+
+    def _pivot(self) -> np.ndarray:
+        middle = 0.5 * self.lower + 0.5 * self.upper
+        return middle if self.angular_velocity.any() else np.zeros(3)
+
+    def _carried(self) -> tuple[np.ndarray, np.ndarray]:
+        # Along an axis without sides it moves in itself.
+        sided = np.isfinite(self.lower) | np.isfinite(self.upper)
+        return np.where(sided, self.velocity, 0.0), self.angular_velocity
 
     def _check(self, model: Model, w: int) -> None:
         for axis, on in enumerate(model.periodic):
@@ -229,3 +175,66 @@ class BoxBoundary(Boundary):
                     self.name, f"sides along {'xyz'[axis]}", "be open where the scene is periodic",
                     [float(self.lower[axis]), float(self.upper[axis])], "use -inf and inf",
                 )  # fmt: skip
+
+
+class SphereBoundary(Boundary):
+    """The inside of a sphere, |x - center| <= radius - R, or its outside, >= radius + R.
+
+    From the outside, what crosses the middle of the sphere in one substep leaves on the other side.
+
+    Args:
+        center: Middle of the sphere [length], (3,).
+        radius: Of the sphere [length], above 0.
+        inside: True: a container; False: an obstacle.
+        friction: mu, at least 0.
+        restitution: e, 0 to 1: speed after over speed before, both against the surface's.
+        group: Which particles it holds; None: all.
+        velocity: Of the sphere, (3,) [length/time].
+        angular_velocity: About the center, (3,) [rad/time].
+
+    Raises:
+        ValueError: Values out of range; a periodic scene.
+
+    Example:
+        >>> bowl = SphereBoundary((0, 1, 0), 1.0, friction=0.1)
+        >>> ball = SphereBoundary((0, 0, 0), 0.2, inside=False, velocity=(1, 0, 0))
+        >>> ball.pose(time=3.0)[0].tolist()
+        [3.0, 0.0, 0.0]
+    """
+
+    shape = boundary_shapes.SPHERE
+    geometry = ("center", "radius", "inside")
+
+    def __init__(
+        self,
+        center: Sequence[float],
+        radius: float,
+        inside: bool = True,
+        friction: float = 0.0,
+        restitution: float = 0.0,
+        group: Any = None,
+        *,
+        velocity: Sequence[float] = STILL,
+        angular_velocity: Sequence[float] = STILL,
+    ):
+        super().__init__(friction, restitution, group, velocity, angular_velocity)
+        self.center = validate.vector(self.name, "center", center, unit="length")
+        self.radius = validate.number(self.name, "radius", radius, above=0.0, unit="length")
+        self.inside = bool(inside)
+
+    def shapes(self) -> list[dict[str, Any]]:
+        ball = {"center": self.center, "radius": self.radius, "container": self.inside}
+        return [self._drawn("sphere", **ball)]
+
+    def _pivot(self) -> np.ndarray:
+        return self.center
+
+    def _carried(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.velocity, np.zeros(3)
+
+    def _check(self, model: Model, w: int) -> None:
+        if any(model.periodic):
+            raise validate.fail(
+                self.name, "scene", "be open along all axes", list(model.periodic),
+                "leave periodic out",
+            )  # fmt: skip

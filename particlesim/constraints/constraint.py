@@ -19,6 +19,7 @@ from .tuples import Tuples, bodies
 if TYPE_CHECKING:
     from ..model import Model
     from ..neighbors import Neighbors
+    from ..stability import Limit, Probe
     from ..state import State
     from .force import ConstraintForce
 
@@ -228,6 +229,12 @@ class Constraint(ConstraintBase):
         ]  # fmt: skip
         launch(self.strain_kernel, self.count, inputs, self.model.device)
 
+    def limits(self, probe: Probe) -> list[Limit]:
+        """None, as XPBD is implicit; how fast it damps is told."""
+        from ..stability.solids import constraint_limits
+
+        return constraint_limits(self, probe)
+
     def persistent(self) -> dict[str, wp.array]:
         breakable = self.count and self.break_force is not None
         return {"broken": self.struct.broken} if breakable else {}
@@ -235,11 +242,16 @@ class Constraint(ConstraintBase):
     def readable(self) -> dict[str, wp.array]:
         return {"lam": self.struct.lam, "scale": self.scale} if self.count else {}
 
+    def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
+        return self.tuples.world if len(array) == self.count and name != "scale" else None
+
     def reset(self, worlds: Sequence[int]) -> None:
-        for array in self.persistent().values():
-            host = array.numpy().copy()
-            host[np.isin(self.tuples.world, list(worlds))] = 0
-            array.assign(host)
+        for name, array in {**self.persistent(), **self.readable()}.items():
+            world = self.worlds(name, array)
+            if world is not None:
+                host = array.numpy().copy()
+                host[np.isin(world, list(worlds))] = 0
+                array.assign(host)
 
     # Reading ------------------------------------------------------------------------------------
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,19 +14,19 @@ from ..kernels import contact_terms as terms
 from ..kernels.constraints import bodies_type
 from ..kernels.pair import pair_kernel
 from ..launch import call, launch, when
-from .base import ConstraintBase
-from .easing import Easing
+from .easing import EasedConstraint, Easing
 from .tuples import bodies
 
 if TYPE_CHECKING:
     from ..model import Model
     from ..neighbors import Neighbors
+    from ..stability import Limit, Probe
     from ..state import State
 
 CLOSEST = 1e-9  # parts of the cutoff: closer than this, particles count as coincident
 
 
-class Contact(ConstraintBase):
+class Contact(EasedConstraint):
     """Particles keep apart: r >= R_i + R_j, with Coulomb friction and restitution.
 
     All contacts of an iteration are solved at once from the same positions (Jacobi), each particle
@@ -89,11 +88,11 @@ class Contact(ConstraintBase):
         self.count = len(members) if largest.max(initial=0.0) > 0 else 0
         if not self.count:
             return
-        # A world of points has no contacts, but shares the list's arrays.
-        self.cutoff = 2.0 * np.where(largest > 0, largest, largest.max())
         self.pairs = neighbors.request(
-            self.name, members, self.cutoff, {"position"}, for_constraint=True
+            self.name, members, 2.0 * largest, {"position"}, for_constraint=True
         )
+        # A world of points has no contacts, and no list.
+        self.cutoff = 2.0 * np.where(largest > 0, largest, largest.max())
 
     def _column(self, name: str) -> np.ndarray:
         return np.array([getattr(peer, name) for peer in self.peers], dtype=float)
@@ -248,12 +247,8 @@ class Contact(ConstraintBase):
         self._sum(self.count_bounces, self.bounces[1], data, self.bounce_shares)
         self._sum(self.bounce_kernel, self.bounces[1], data, self.bodies)
 
-    def persistent(self) -> dict[str, wp.array]:
-        return self.easing.persistent() if self.count else {}
+    def limits(self, probe: Probe) -> list[Limit]:
+        """By the speed of the particles against their radius."""
+        from ..stability.solids import contact_limits
 
-    def reset(self, worlds: Sequence[int]) -> None:
-        self.placed(worlds)
-
-    def placed(self, worlds: Iterable[int]) -> None:
-        if self.count:
-            self.easing.mark(worlds)
+        return contact_limits(self, probe)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import warp as wp
 
 from ..kernels.easing import easing_type
 from ..model import Model
+from .base import ConstraintBase
 
 FRAMES = 30.0  # in which slack falls to 1/e, where the depenetration speed allows
 
@@ -49,3 +50,23 @@ class Easing:
     def persistent(self) -> dict[str, wp.array]:
         """What outlives a substep."""
         return {"slack": self.slack, "marked": self.marked, "any_marked": self.any_marked}
+
+
+class EasedConstraint(ConstraintBase):
+    """A constraint on particles' radii that gives way to the overlaps of a start.
+
+    A member makes its ``easing`` when it is attached, if it holds particles at all.
+    """
+
+    count: int  # of the particles that it holds
+    easing: Easing
+
+    def persistent(self) -> dict[str, wp.array]:
+        return self.easing.persistent() if self.count else {}
+
+    def reset(self, worlds: Sequence[int]) -> None:
+        self.placed(worlds)
+
+    def placed(self, worlds: Iterable[int]) -> None:
+        if self.count:
+            self.easing.mark(worlds)

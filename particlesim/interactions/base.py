@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from ..model import Model
     from ..neighbors import Neighbors
+    from ..stability import Limit, Probe
     from ..state import State
 
 # Per-particle quantities that a law may name, beside the attributes of the scene.
@@ -93,6 +94,14 @@ class Interaction(Bindable):
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         """Add the potential energy and the virial of each particle (float64), on demand."""
+
+    def limits(self, probe: Probe) -> list[Limit]:
+        """Bounds on the substep at the present state (see ``Simulation.stability``).
+
+        By default from how ``apply`` answers to small changes of positions and velocities. An
+        interaction whose ``apply`` keeps anything from one call to the next says it otherwise.
+        """
+        return probe.response(self)
 
     def reset(self, worlds: Sequence[int]) -> None:
         """Forget what these worlds have left behind."""

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import warp as wp
 
 from .. import validate
 from ..law import Law, law
+from .fluid_part import FluidPart
 
 
-class EquationOfState:
+class EquationOfState(FluidPart):
     """Base of barotropic equations of state P(rho).
 
     A member gives three laws. Each may name ``density``, ``rest_density`` and ``smoothing_length``
@@ -24,17 +23,7 @@ class EquationOfState:
     pressure: Law
     energy: Law
     sound_speed: Law
-    parameters: dict[str, Any]
-
-    @property
-    def name(self) -> str:
-        """What reports and errors call it."""
-        return type(self).__name__
-
-    @property
-    def laws(self) -> dict[str, Law]:
-        """The laws by name."""
-        return {name: getattr(self, name) for name in ("pressure", "energy", "sound_speed")}
+    law_names = ("pressure", "energy", "sound_speed")
 
 
 @law

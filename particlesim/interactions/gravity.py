@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import warp as wp
 
 from .. import validate
 from ..law import law
 from .pair import Pair
+
+if TYPE_CHECKING:
+    from ..stability import Limit, Probe
 
 
 @law
@@ -45,3 +48,11 @@ class Gravity(Pair):
             ),
         }
         super().__init__(gravity_potential, gravity_force, group, None, values)
+
+    def limits(self, probe: Probe) -> list[Limit]:
+        """By the tide now, by orbits' pericentres, and by passages at the softening length."""
+        from ..stability.orbits import closest_approach
+        from ..stability.pairs import closest_passage
+
+        limits = probe.response(self) + closest_passage(self, probe)
+        return limits + closest_approach(self, probe)

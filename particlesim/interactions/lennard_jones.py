@@ -111,6 +111,10 @@ class LennardJones(Pair):
             {"strength": strength, "sigma": sigma, "u_cut": u_cut, "f_cut": f_cut, "cut": cut},
         )  # fmt: skip
 
+    @property
+    def acts(self) -> bool:
+        return self.epsilon > 0
+
     def tail(self, density: float) -> tuple[float, float]:
         """Energy and virial that the cutoff leaves out of each particle, for g(r) = 1 beyond it.
 

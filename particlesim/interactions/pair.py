@@ -16,8 +16,10 @@ from ..law import law as make_law
 from .base import Arguments, Interaction
 
 if TYPE_CHECKING:
+    from ..all_pairs import AllPairs
     from ..model import Model
     from ..neighbors import Neighbors
+    from ..stability import Limit, Probe
     from ..state import State
 
 # Closer than this, particles count as coincident: in parts of the cutoff, and without a cutoff.
@@ -82,6 +84,14 @@ class Pair(Interaction):
             self.quantities |= argument.quantities
         self.requires = frozenset({"force"}) | self.quantities
 
+    @property
+    def acts(self) -> bool:
+        """Whether a pair can feel anything. Nothing is asked of a law that is zero everywhere.
+
+        (Zero times what a singular law gives for coincident particles is not a number.)
+        """
+        return True
+
     def kind(self) -> tuple[Any, ...]:
         laws = [each and each.key for each in (self.potential, self.force)]
         return (type(self), *laws, self.cutoff is None, tuple(self.parameters))
@@ -99,7 +109,7 @@ class Pair(Interaction):
         columns["cutoff_squared"] = (
             np.full(model.world_count, np.finfo(model.precision.numpy).max)
             if cutoff is None
-            else cutoff**2
+            else cutoff**2 * [peer.acts for peer in self.peers]
         )
         columns["closest_squared"] = (
             np.full(model.world_count, CLOSEST**2) if cutoff is None else (COINCIDENT * cutoff) ** 2
@@ -107,8 +117,7 @@ class Pair(Interaction):
         self.Params, self.params = model.parameters("PairParameters", columns)
 
     def attach(self, model: Model, state: State) -> None:
-        fields = {"x": self.pairs.fields["position"]}
-        fields |= {name: self.pairs.fields[name] for name in self.quantities if name != "position"}
+        fields = self.fields_of(self.pairs)
         self.Data = structure_of("PairData", fields)
         self.data = filled(self.Data, fields)
         out = {"f": state.force}
@@ -124,6 +133,11 @@ class Pair(Interaction):
         store = kernels.add_force(precision, self.Data, self.Params, self.Out)
         self.kernel = self._kernel(self.term, store, self.Out, 3, vectorised=model.vectorised)
 
+    def fields_of(self, pairs: AllPairs) -> dict[str, wp.array]:
+        """What the term reads, in the order of a list's slots."""
+        own = {name: pairs.fields[name] for name in self.quantities if name != "position"}
+        return {"x": pairs.fields["position"], **own}
+
     def _kernel(self, term: Any, store: Any, out: Any, width: int, vectorised: bool) -> Any:
         model = self.model
         return kernels.pair_kernel(
@@ -132,12 +146,18 @@ class Pair(Interaction):
         )  # fmt: skip
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        launch(
-            self.kernel,
-            self.pairs.count,
-            [self.pairs.pairs, self.model.box, self.params, self.data, self.out],
-            self.model.device,
-        )
+        self.add_forces(self.params)
+
+    def add_forces(self, params: wp.array) -> None:
+        """Sum the forces by these parameters, one entry a world."""
+        inputs = [self.pairs.pairs, self.model.box, params, self.data, self.out]
+        launch(self.kernel, self.pairs.count, inputs, self.model.device)
+
+    def limits(self, probe: Probe) -> list[Limit]:
+        """By the gradient at the present distances and, within a cutoff, at those to come."""
+        from ..stability.pairs import collisions
+
+        return probe.response(self) + ([] if self.cutoff is None else collisions(self, probe))
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         if self.potential is None:

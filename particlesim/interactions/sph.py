@@ -22,6 +22,7 @@ from .viscosities import Viscosity
 
 if TYPE_CHECKING:
     from ..model import Model
+    from ..stability import Limit, Probe
     from ..state import State
 
 # What laws may name beside smoothing_length, rest_density and the parameters of their part.
@@ -189,15 +190,20 @@ class SPH(Interaction):
     def _attach_density(self, state: State) -> None:
         precision = self.model.precision
         out = {"state": self.slot_state, "rho": state.density, "pressure": state.pressure}
-        Out, self.density_out = self._out("FluidStates", out)
+        self.DensityOut, self.density_out = self._out("FluidStates", out)
         self.weight = self.smoothing.weight.function(precision)
+        sounds = self.viscosity is not None
+        sound_speed = self._law(self.equation_of_state, "sound_speed") if sounds else None
+        self.density_kernel = self._density_kernel(sound_speed)
+
+    def _density_kernel(self, sound_speed: wp.Function | None) -> wp.Kernel:
+        precision = self.model.precision
         term = kernels.density_term(self.weight, precision, self.Data, self.Params)
         store = kernels.keep_state(
-            self.weight, self._law(self.equation_of_state, "pressure"),
-            self._law(self.equation_of_state, "sound_speed") if self.viscosity else None,
-            precision, self.Data, self.Params, Out,
+            self.weight, self._law(self.equation_of_state, "pressure"), sound_speed, precision,
+            self.Data, self.Params, self.DensityOut,
         )  # fmt: skip
-        self.density_kernel = self._kernel(term, store, Out, 1)
+        return self._kernel(term, store, self.DensityOut, 1)
 
     def _attach_force(self, state: State) -> None:
         precision = self.model.precision
@@ -236,6 +242,23 @@ class SPH(Interaction):
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         self._launch(self.density_kernel, self.density_out)
         self._launch(self.force_kernel, self.force_out)
+
+    def limits(self, probe: Probe) -> list[Limit]:
+        """By sound with viscosity, and by acceleration."""
+        from ..stability.fluid import fluid_limits
+
+        return fluid_limits(self, probe)
+
+    def sound_speeds(self, probe: Probe) -> np.ndarray:
+        """Speed of sound at the present densities, of each member [length/time]."""
+        probe.force([self])
+        if self.viscosity is None:  # whose passes have no need of it
+            kernel = self._density_kernel(self._law(self.equation_of_state, "sound_speed"))
+            self._launch(kernel, self.density_out)
+        c = np.empty(self.pairs.count)
+        members = self.pairs.members_host
+        c[np.searchsorted(members, self.pairs.order.numpy())] = self.slot_state.numpy()[:, 3]
+        return c
 
     def update_density(self) -> None:
         """Density, pressure and their slots at the present positions; not within a substep."""

@@ -15,6 +15,7 @@ from .base import Interaction
 if TYPE_CHECKING:
     from ..model import Model
     from ..neighbors import Neighbors
+    from ..stability import Limit, Probe
     from ..state import State
 
 
@@ -84,6 +85,21 @@ class Springs(Interaction):
             self.bonds, self.springs, self.model.box, state.position, state.velocity, state.force
         ] if self.count else []  # fmt: skip
         launch(force, self.count, inputs, self.model.device)
+
+    def limits(self, probe: Probe) -> list[Limit]:
+        """By the gradient of the force, and at most the bound of Anderson and Morley."""
+        from ..stability.bonds import spring_bound
+
+        if not self.count:
+            return []
+        w, offsets = probe.inverse_mass, self.model.offsets
+        pairs = np.concatenate([peer.pairs + offsets[k] for k, peer in enumerate(self.peers)])
+        columns = [
+            np.concatenate([getattr(peer, name) for peer in self.peers])
+            for name in ("stiffness", "damping")
+        ]
+        most = spring_bound(pairs, columns[0], w), spring_bound(pairs, columns[1], w)
+        return probe.response(self, most)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         if not self.count:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import warp as wp
 
 from .. import validate
 from ..law import Law, law
+from .fluid_part import FluidPart
 
 
-class Viscosity:
+class Viscosity(FluidPart):
     """Base of viscosities that act along the pair, as a term Pi_ij beside P/rho^2.
 
     A member gives one law, ``term``: Pi_ij [length^5 / (mass time^2)] of what it names of
@@ -25,17 +24,7 @@ class Viscosity:
     """
 
     term: Law
-    parameters: dict[str, Any]
-
-    @property
-    def name(self) -> str:
-        """What reports and errors call it."""
-        return type(self).__name__
-
-    @property
-    def laws(self) -> dict[str, Law]:
-        """The laws by name."""
-        return {"term": self.term}
+    law_names = ("term",)
 
 
 @law

@@ -13,6 +13,7 @@ from typing import Any
 from .. import validate
 from ..settings import Settings
 from ..simulation import Simulation
+from ..stability import automatic
 
 OWNER = "tradeoff"
 FRAMES = 240  # where neither the caller nor the scene's module says how many
@@ -66,6 +67,9 @@ class Study:
                 f"{OWNER}: settings must be a Settings, got {self.settings!r}; use Settings(...)."
             )
         self.parameters = inspect.signature(build).parameters
+        self.options: dict[str, Any] = {}
+        self.options = self.split(options or {}, "options", knobs=())[0]
+        self.settings = self._chosen(self.settings, self.options)
         wanted = getattr(module, "frames", FRAMES)
         self.frames = validate.whole(OWNER, "frames", wanted if frames is None else frames)
         self.duration = self.frames * self.settings.dt
@@ -77,8 +81,6 @@ class Study:
         # The scene's answer is known for the scene's own frames.
         self.known = getattr(module, "error", None)
         self.known_here = self.known is not None and self.frames == wanted
-        self.options: dict[str, Any] = {}
-        self.options = self.split(options or {}, "options", knobs=())[0]
 
     def split(
         self, values: Mapping[str, Any], argument: str, knobs: Iterable[str] = KNOBS
@@ -119,7 +121,8 @@ class Study:
     def plan(self, values: Mapping[str, Any], argument: str = "vary") -> Plan:
         """The plan of these values, over the study's simulated time."""
         options, knobs = self.split(values, argument)
-        settings = self.settings.replace(**knobs)
+        options = {**self.options, **options}
+        settings = self._chosen(self.settings.replace(**knobs), options)
         exact = self.duration / settings.dt if settings.dt else 0.0
         frames = round(exact)
         if frames < 1 or abs(frames - exact) > 1e-6 * exact:
@@ -127,7 +130,13 @@ class Study:
                 OWNER, f"{argument} dt", f"divide the simulated time, {self.duration:g} s",
                 settings.dt, "choose whole fractions of it, or other frames",
             )  # fmt: skip
-        return Plan(dict(values), {**self.options, **options}, settings, frames)
+        return Plan(dict(values), options, settings, frames)
+
+    def _chosen(self, settings: Settings, options: dict[str, Any]) -> Settings:
+        """The settings, with what is "auto" as the scene's simulation chooses it."""
+        if not settings.automatic:
+            return settings
+        return automatic([self.build(**options)], settings, self.device)
 
     def plans(self, vary: Mapping[str, Iterable[Any]]) -> list[Plan]:
         """Every combination of the values of ``vary``; the last name varies fastest."""

@@ -206,7 +206,7 @@ def test_block_stops(iterations, device, precision):
     assert way == pytest.approx(speed**2 / (2 * friction * G), rel=2 * friction * G / 1200 / speed)
 
 
-@pytest.mark.parametrize("onto", ["plane", "box", "grain"])
+@pytest.mark.parametrize("onto", ["plane", "box", "bowl", "hill", "grain"])
 @pytest.mark.parametrize("e", [0.5, 0.8, 1.0])
 def test_drop_returns_to_e_squared(e, onto, device):
     """From 1 m back to e^2 m, within 1 %."""
@@ -220,6 +220,8 @@ def test_drop_returns_to_e_squared(e, onto, device):
         {
             "plane": ps.PlaneBoundary((0, 0, 0), (0, 1, 0), restitution=e),
             "box": ps.BoxBoundary((-1, 0, -1), (1, np.inf, 1), restitution=e),
+            "bowl": ps.SphereBoundary((0, 2, 0), 2.0, restitution=e),
+            "hill": ps.SphereBoundary((0, -2, 0), 2.0, inside=False, restitution=e),
             "grain": ps.Contact(restitution=e),
         }[onto]
     )

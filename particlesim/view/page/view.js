@@ -1,0 +1,330 @@
+// The page: state, time, and what goes on between the controls, the server and the picture.
+
+import { Camera, attach } from "./camera.js";
+import { Film, ask, unpack } from "./film.js";
+import { Painter } from "./painter.js";
+import { listen } from "./keys.js";
+import { Panel, element } from "./panel.js";
+
+const AHEAD = 8; // frames fetched before they are due
+const SLOW = 30; // milliseconds a picture, from which on motion is drawn with fewer samples
+const POLL = { live: 200, file: 1500 }; // milliseconds between questions for news
+const KEPT = 1e4; // pixels a side that are drawn at most
+
+class View {
+  constructor() {
+    const start = new URLSearchParams(location.hash.slice(1));
+    this.start = start;
+    this.state = {
+      index: 0, playing: !start.has("paused"), speed: 1, world: null, apart: true, color: null,
+      map: "viridis", low: 0, high: 1, auto: true, boundaries: "solid", grid: true,
+    };
+    this.canvas = element("canvas");
+    this.panel = new Panel((change) => this.change(change));
+    this.film = new Film((index) => this.arrived(index), (index, error) => this.missed(index, error));
+    this.shown = null; // index of the frame in the picture
+    this.due = 0; // frames that should have been shown since
+    this.moved = 0; // when the camera was moved last
+    this.pace = 0; // milliseconds a picture, of late
+    this.pictures = 0; // drawn so far
+    this.live = null;
+  }
+
+  async run() {
+    this.panel.complain("");
+    this.painter = new Painter(this.canvas);
+    this.canvas.addEventListener("webglcontextlost", () => {
+      this.panel.complain("the graphics card was taken away; reload the page");
+    });
+    await this.open();
+    const { start, state, film } = this;
+    if (start.has("world")) state.world = Number(start.get("world"));
+    if (start.has("frame")) state.index = Math.max(0, film.codes.indexOf(Number(start.get("frame"))));
+    state.color = start.get("color") ?? this.scene.color;
+    await this.requery();
+    attach(() => this.camera, this.canvas, () => this.touch(), () => this.fit());
+    listen(this);
+    requestAnimationFrame((now) => this.tick(now));
+    if (this.live && state.playing) this.order("play");
+    this.poll();
+  }
+
+  // Read what there is, at first and when it has been replaced.
+  async open() {
+    this.scene = await (await ask("scene")).json();
+    this.film.codes = this.scene.frames;
+    this.take = this.scene.take;
+    this.live = this.scene.live ? { playing: false, done: 0, planned: 0, error: null } : null;
+    this.camera ??= new Camera(this.scene.up, this.scene.camera);
+    if (this.pictures === 0) this.state.grid = this.scene.floor !== null;
+    this.state.index = Math.min(this.state.index, this.film.codes.length - 1);
+    this.panel.offer(this.scene);
+  }
+
+  // A change that a person has made.
+  async change(change) {
+    const { world } = this.state;
+    Object.assign(this.state, change);
+    const keys = ["world", "apart", "color", "map", "low", "high", "auto"];
+    if (keys.some((key) => key in change)) {
+      this.refit ||= this.state.world !== world || "apart" in change;
+      await this.requery();
+    }
+    this.panel.show(this.state);
+    this.touch();
+  }
+
+  // Ask for frames anew, as the state wants them.
+  async requery() {
+    const { state, film } = this;
+    try {
+      if (state.color && state.auto) {
+        [state.low, state.high] = await (await ask(`span?color=${encodeURIComponent(state.color)}`)).json();
+        this.spanned = film.codes.length;
+      }
+      const words = new URLSearchParams();
+      if (state.world !== null) words.set("world", state.world);
+      if (state.apart && this.scene.coinciding) words.set("apart", 1);
+      if (state.color) {
+        for (const key of ["color", "map", "low", "high"]) words.set(key, state[key]);
+      }
+      film.clear();
+      film.query = words.toString();
+      const still = unpack(await (await ask(`still?${film.query}`)).arrayBuffer());
+      if (film.query !== words.toString()) return;
+      this.still = still;
+      this.painter.upload("still", still);
+      this.shown = null;
+      this.panel.complain("");
+    } catch (error) {
+      this.panel.complain(error.message);
+    }
+    this.panel.show(state);
+    this.fetch();
+  }
+
+  // Frames that will be needed.
+  fetch() {
+    const { index, playing } = this.state;
+    const count = this.film.codes.length;
+    const ahead = playing ? AHEAD : 1;
+    const wanted = Array.from({ length: Math.min(ahead, count) }, (_, k) => index + k);
+    this.film.want(this.live ? wanted.filter((k) => k < count) : wanted.map((k) => k % count));
+  }
+
+  arrived(index) {
+    if (index === this.state.index) this.present();
+    this.fetch();
+  }
+
+  missed(index, error) {
+    if (index === this.state.index) {
+      this.panel.complain(error.message);
+      this.state.playing = false;
+      this.showTime();
+    }
+    this.fetch();
+  }
+
+  // Put the frame of the present index into the picture, if it is here.
+  present() {
+    const { index } = this.state;
+    const packet = this.film.get(index);
+    if (!packet || this.shown === index) return;
+    this.painter.upload("frame", packet);
+    this.frame = packet;
+    this.shown = index;
+    const count = (name) => (packet.arrays[name]?.count ?? 0) + (this.still.arrays[name]?.count ?? 0);
+    this.panel.counts({
+      particles: count("thing.ball"), links: count("thing.cone") / 2,
+      triangles: (count("thing.corner") + count("thing.veil")) / 3,
+    });
+    if (!this.fitted || this.refit) this.fit();
+    this.showTime();
+    this.touch();
+  }
+
+  go(index) {
+    const last = this.film.codes.length - 1;
+    this.state.index = Math.max(0, Math.min(last, index));
+    const error = this.film.refused.get(this.state.index);
+    this.panel.complain(error ? error.message : "");
+    this.present();
+    this.showTime();
+    this.fetch();
+  }
+
+  showTime() {
+    const { index, playing } = this.state;
+    const codes = this.film.codes;
+    const seconds = ((codes[index] ?? 0) - (codes[0] ?? 0)) * this.scene.frameTime;
+    this.panel.time({ index, codes, playing, live: this.live, seconds });
+  }
+
+  play(playing) {
+    const { state, film } = this;
+    state.playing = playing;
+    this.due = 0;
+    if (this.live) {
+      if (playing && this.live.done >= this.live.planned && state.index >= film.codes.length - 1) state.index = 0;
+      this.order(playing ? "play" : "pause");
+    }
+    this.showTime();
+    this.fetch();
+  }
+
+  // Play, pause or reset the running scene.
+  async order(order) {
+    try {
+      await this.news(await (await ask(`live/${order}`, { method: "POST" })).json(), 0);
+    } catch (error) {
+      this.panel.complain(error.message);
+    }
+  }
+
+  async reset() {
+    this.state.playing = false;
+    this.state.index = 0;
+    await this.order("reset");
+    this.go(0);
+  }
+
+  // Ask for news again and again.
+  async poll() {
+    try {
+      const since = this.film.codes.length;
+      await this.news(await (await ask(`status?since=${since}`)).json(), since);
+      if (this.lost) this.panel.complain("");
+      this.lost = false;
+    } catch (error) {
+      this.lost = true;
+      this.panel.complain(error.message);
+    }
+    setTimeout(() => this.poll(), this.live ? POLL.live : POLL.file);
+  }
+
+  async news({ take, frames, live }, since) {
+    if (take !== this.take) {
+      await this.open();
+      this.refit = this.live === null;
+      await this.requery();
+    } else if (since === 0) {
+      this.film.codes = frames;
+    } else if (since === this.film.codes.length) {
+      this.film.codes.push(...frames);
+    }
+    const failed = live?.error && live.error !== this.live?.error;
+    this.live = live;
+    if (failed) {
+      this.panel.complain(live.error);
+    }
+    // The range of a value is known better with more frames.
+    const { color, auto } = this.state;
+    if (live && color && auto && this.film.codes.length >= 2 * this.spanned) await this.requery();
+    this.showTime();
+    this.fetch();
+  }
+
+  get box() {
+    const boxes = [this.frame?.box, this.still?.box].filter(Boolean);
+    if (!boxes.length) return [[-1, -1, -1], [1, 1, 1]];
+    const ends = (k, choose) => [0, 1, 2].map((i) => choose(...boxes.map((box) => box[k][i])));
+    return [ends(0, Math.min), ends(1, Math.max)];
+  }
+
+  fit() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const below = Math.min(0.3, (height - element("slider").parentElement.offsetTop) / height);
+    this.camera.fit(this.box, width / height, below);
+    this.fitted = true;
+    this.refit = false;
+    this.touch();
+  }
+
+  // Something looks different now.
+  touch() {
+    this.moved = performance.now();
+    this.stale = true;
+  }
+
+  tick(now) {
+    const elapsed = Math.min(now - (this.before ?? now), 200);
+    this.before = now;
+    if (this.state.playing) this.advance(elapsed);
+    if (this.resized()) this.touch();
+    const resting = now - this.moved > 180 && !this.state.playing;
+    if (this.stale) {
+      this.pace += 0.2 * (elapsed - this.pace);
+      this.draw(this.pace < SLOW ? 2 : 1);
+      this.stale = false;
+    } else if (resting && this.samples < 2 && this.pace < 4 * SLOW) {
+      this.draw(2);
+    }
+    requestAnimationFrame((time) => this.tick(time));
+  }
+
+  // Show the next frame when it is time and it has come.
+  advance(elapsed) {
+    const { state, film } = this;
+    this.due = Math.min(this.due + (elapsed / 1000) * this.scene.fps * state.speed, 4);
+    while (this.due >= 1) {
+      const last = state.index >= film.codes.length - 1;
+      if (last && (this.live || film.codes.length < 2)) {
+        this.due = 1;
+        if (!this.live || !this.live.playing) this.rest();
+        return;
+      }
+      const next = last ? 0 : state.index + 1;
+      const damaged = film.refused.get(next);
+      if (!film.get(next) && !damaged) {
+        this.due = 1;
+        return;
+      }
+      this.due -= 1;
+      state.index = next;
+      if (damaged) this.panel.complain(damaged.message);
+    }
+    this.present();
+    this.showTime();
+    this.fetch();
+  }
+
+  // Nothing more comes: a running scene is at its end, or has failed.
+  rest() {
+    this.state.playing = false;
+    this.showTime();
+  }
+
+  resized() {
+    const ratio = window.devicePixelRatio || 1;
+    const size = [this.canvas.clientWidth, this.canvas.clientHeight];
+    const [width, height] = size.map((x) => Math.max(1, Math.min(KEPT, Math.round(x * ratio))));
+    if (this.canvas.width === width && this.canvas.height === height) return false;
+    Object.assign(this.canvas, { width, height });
+    return true;
+  }
+
+  draw(samples) {
+    if (!this.still) return;
+    // Small pixels need no more samples.
+    this.samples = window.devicePixelRatio >= 2 ? 1 : samples;
+    const { up, floor } = this.scene;
+    const box = this.box;
+    const lowest = box[0].reduce((s, x, k) => s + x * up[k], 0);
+    this.painter.draw({
+      camera: this.camera, box, up, boundaries: this.state.boundaries, samples: this.samples,
+      floor: this.state.grid ? floor ?? lowest : null,
+    });
+    this.samples = samples;
+    this.pictures += 1;
+  }
+
+  stepTo(index) {
+    if (this.state.playing) this.play(false);
+    this.go(index);
+  }
+}
+
+const view = new View();
+window.particlesim = view; // for scripts and the console
+view.run().catch((error) => view.panel.complain(error.message));
