@@ -54,19 +54,3 @@ def block_sums_kernel(precision: Precision) -> wp.Kernel:
         sums_out[b, 9] = total_virial
 
     return block_sums
-
-
-@functools.cache
-def finite_kernel(precision: Precision) -> wp.Kernel:
-    """Kernel: raise a flag if a position or velocity is not finite."""
-    vec3 = precision.vec3
-
-    @register
-    def find_nonfinite(
-        first: int, x: wp.array(dtype=vec3), v: wp.array(dtype=vec3), flag: wp.array(dtype=wp.int32)
-    ):
-        i = first + wp.tid()
-        if not (wp.isfinite(x[i]) and wp.isfinite(v[i])):
-            flag[0] = 1  # every writer writes the same
-
-    return find_nonfinite

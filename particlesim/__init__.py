@@ -38,6 +38,7 @@ from .stability import Stability, StabilityWarning
 from .stress import Stress, stress
 from .surface import Surface
 from .tradeoff import Tradeoff, tradeoff
+from .tune import Tuned, tune
 
 __version__ = "0.1.0"
 
@@ -76,6 +77,7 @@ __all__ = [
     "Surface",
     "Tait",
     "Tradeoff",
+    "Tuned",
     "UniformGravity",
     "UsdRecorder",
     "law",
@@ -83,4 +85,5 @@ __all__ = [
     "sample",
     "stress",
     "tradeoff",
+    "tune",
 ]

@@ -193,9 +193,7 @@ def motion(model: Model, state: State) -> np.ndarray:
     mass = np.where(state.inverse_mass.numpy() > 0, state.mass.numpy().astype(np.float64), 0.0)
     x, v = (array.numpy().astype(np.float64) for array in (state.position, state.velocity))
     p = mass[:, None] * v
-    rows = np.concatenate(
-        [0.5 * (p * v).sum(axis=1, keepdims=True), p, np.cross(x, p)], axis=1
-    )
+    rows = np.concatenate([0.5 * (p * v).sum(axis=1, keepdims=True), p, np.cross(x, p)], axis=1)
     result = np.zeros((model.world_count, 7))
     np.add.at(result, model.world_of, rows)
     return result

@@ -38,6 +38,19 @@ class Ledger:
     ``kinetic_change`` (worlds,), ``momentum_change`` and ``angular_momentum_change`` (worlds, 3)
     are those since the start, without what was written from outside. ``str()`` makes the table,
     summed over worlds. The definitions are in :mod:`particlesim.accounts`.
+
+    Example:
+        >>> from particlesim import Scene, Settings, Simulation, UniformGravity
+        >>> scene = Scene()
+        >>> stone = scene.add_particles([(0, 2, 0)], mass=3.0)
+        >>> gravity = scene.add_interaction(UniformGravity((0, -10, 0)))
+        >>> sim = Simulation(scene, Settings(dt=0.5, ledger=True), device="cpu")
+        >>> sim.step()
+        >>> ledger = sim.ledger()  # v = g t = 5, so 3 v^2 / 2 = 37.5
+        >>> ledger["UniformGravity"].work.round(4).tolist()
+        [37.5]
+        >>> ledger["UniformGravity"].impulse.round(4).tolist()
+        [[0.0, -15.0, 0.0]]
     """
 
     entries: tuple[Entry, ...]
@@ -48,12 +61,12 @@ class Ledger:
     @property
     def unaccounted(self) -> np.ndarray:
         """Change of the kinetic energy that no part's work accounts for: round-off [J]."""
-        return self.kinetic_change - sum(each.work for each in self.entries)
+        return self.kinetic_change - np.sum([each.work for each in self.entries], axis=0)
 
     @property
     def unaccounted_momentum(self) -> np.ndarray:
         """Change of the momentum that no part's impulse accounts for: round-off [N s]."""
-        return self.momentum_change - sum(each.impulse for each in self.entries)
+        return self.momentum_change - np.sum([each.impulse for each in self.entries], axis=0)
 
     def __getitem__(self, name: str) -> Entry:
         names = [each.name for each in self.entries]
@@ -65,11 +78,11 @@ class Ledger:
 
     def __str__(self) -> str:
         rows = [(each.name, each.work.sum(), each.impulse.sum(axis=0)) for each in self.entries]
-        left = self.unaccounted_momentum.sum(axis=0)
+        changed, left = self.momentum_change.sum(axis=0), self.unaccounted_momentum.sum(axis=0)
         total = [
-            ("kinetic energy, momentum", self.kinetic_change.sum(), self.momentum_change.sum(axis=0)),
-            ("unaccounted", np.sum(self.unaccounted), left),
-        ]  # fmt: skip
+            ("kinetic energy, momentum", self.kinetic_change.sum(), changed),
+            ("unaccounted", self.unaccounted.sum(), left),
+        ]
         width = max(len(name) for name, _, _ in [*rows, *total])
         worlds = len(self.kinetic_change)
         head = f"{'since the start' + (f', {worlds} worlds' if worlds > 1 else ''):<{width}}"

@@ -7,36 +7,30 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Self
 
-import numpy as np
 import warp as wp
 
-from . import batch, checkpoint, ledger, validate
-from .access import Access
+from . import batch, checkpoint, validate
 from .accounts import Accounts
 from .assign import assign_rows, reset_worlds
-from .diagnostics import Diagnostics, measure
 from .executors import Executor
-from .explain import Explanation, explain
 from .frames import Frames, evaluate_forces
 from .incident import Incident
 from .integrators import METHODS
 from .interactions.fusion import fuse
 from .launch import owner
-from .ledger import Ledger
 from .model import Model
 from .neighbors import Neighbors
 from .observers import FINISH, FORCE, PROJECT, Observers
-from .render import Camera, Image
+from .reading import Reading
 from .scene import Scene
 from .settings import Settings
 from .snapshot import Snapshot
-from .stability import Stability, automatic, stability, warn_if_past
+from .stability import automatic, warn_if_past
 from .state import State
 from .watchdog import Watchdog
-from .world import World
 
 
-class Simulation(Access):
+class Simulation(Reading):
     """A scene, or worlds of one kind, in motion.
 
     Args:
@@ -239,39 +233,11 @@ class Simulation(Access):
         """Let go of graphs and threads; the next step makes them anew."""
         self.frames.close()
 
-    # Reading and writing --------------------------------------------------------------------
-
-    @property
-    def frozen(self) -> list[int]:
-        """Worlds that stand still since the watchdog froze them; :meth:`reset` frees them."""
-        return sorted(self.watchdog.frozen)
-
-    @property
-    def world_count(self) -> int:
-        """How many worlds."""
-        return self.model.world_count
-
-    @property
-    def particle_count(self) -> int:
-        """Particles of all worlds."""
-        return self.model.particle_count
-
-    @property
-    def time(self) -> float:
-        """Simulated time since the start [s]."""
-        return self.frame * self.settings.dt
-
-    def get(self, name: str) -> np.ndarray:
-        """A per-particle array, copied to the host."""
-        return self.state[name].numpy().copy()
+    # Writing ----------------------------------------------------------------------------
 
     def set(self, name: str, value: Any, rows: slice = slice(None)) -> None:
         """Write a per-particle array, or rows of it; what was derived from it is forgotten."""
         assign_rows(self, name, value, rows)
-
-    def world(self, index: int) -> World:
-        """A view of one world."""
-        return World(self, index)
 
     def reset(self, worlds: Iterable[int] | None = None) -> None:
         """Put worlds (None: all) back to their start, with nothing left of what they went through.
@@ -280,19 +246,6 @@ class Simulation(Access):
         on untouched.
         """
         reset_worlds(self, worlds)
-
-    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-        """Write a checkpoint: all that is needed to go on from here, bit for bit.
-
-        Args:
-            path: A ``.npz`` file; it appears whole or not at all.
-            overwrite: Replace an existing file.
-
-        Raises:
-            ValueError: Another suffix. FileExistsError: It exists, and ``overwrite`` is not set.
-            OSError: The folder is missing, or the file could not be written.
-        """
-        checkpoint.save(self, path, overwrite)
 
     @classmethod
     def load(
@@ -311,7 +264,7 @@ class Simulation(Access):
                 kinds of interactions and constraints, their particles and tuples, the periodic
                 box); with other values of parameters the run goes on with those.
             settings: None: as saved; else they must agree in ``dt``, ``integrator``,
-                ``precision`` and ``compensated``.
+                ``precision``, ``compensated`` and ``ledger``.
             device: As for a new Simulation.
             worlds: As for a new Simulation; None: as many copies of a single scene as were saved.
 
@@ -320,62 +273,3 @@ class Simulation(Access):
                 no checkpoint. OSError: The file is missing or cannot be read.
         """
         return checkpoint.load(cls, path, scene, settings, device, worlds)
-
-    def render(
-        self,
-        path: str | os.PathLike[str] | None = None,
-        width: int = 1280,
-        height: int = 720,
-        camera: Camera | None = None,
-        color: str | None = None,
-        **options: Any,
-    ) -> Image:
-        """A picture of the present state, with the colours and boundaries of recordings.
-
-        Args:
-            path: File to write too, ``.png``, ``.jpg`` or ``.webp``.
-            width: In pixels.
-            height: In pixels.
-            camera: None: one that sees all.
-            color: Name of a value to colour particles by, as ``color_by`` of
-                :class:`~particlesim.record.UsdRecorder`; None: each group has its own colour.
-            **options: ``color_map``, ``color_range``, ``worlds``, ``groups``, ``layout`` and
-                ``surface`` as of UsdRecorder, but worlds stand side by side; ``ground``: True,
-                False or a height [length], None: where there are boundaries; ``background``
-                (linear r, g, b), ``shadows``, ``occlusion``, ``supersample`` (1, 2 or 4) and
-                ``overwrite``.
-
-        Raises:
-            ValueError: Values out of range, names that are not there, another suffix.
-            FileExistsError: The file exists, and ``overwrite`` is not set.
-            ImportError: Pillow, which writes files, is not installed.
-        """
-        from .render.preview import render
-
-        return render(self, path, width, height, camera, color, **options)
-
-    def _repr_png_(self) -> bytes | None:
-        """A picture for notebooks, where Pillow is installed."""
-        from .render.preview import notebook_picture
-
-        return notebook_picture(self)
-
-    def stability(self) -> Stability:
-        """The largest safe substep of every part at the present moment, and what binds."""
-        return stability(self)
-
-    def diagnostics(self) -> Diagnostics:
-        """Conserved quantities of every world at the present time."""
-        return measure(self)
-
-    def ledger(self) -> Ledger:
-        """Work and impulse of every interaction and constraint since the start, world by world.
-
-        Raises:
-            ValueError: ``settings.ledger`` is not set.
-        """
-        return ledger.read(self)
-
-    def explain(self) -> Explanation:
-        """What is allocated, compiled and launched, and why."""
-        return explain(self)

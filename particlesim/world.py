@@ -35,7 +35,10 @@ class World(Access):
 
     def get(self, name: str) -> np.ndarray:
         """A per-particle array of this world, copied to the host."""
-        return self.sim.state[name][self.rows].numpy().copy()
+        array = self.sim.state[name]
+        if self.rows.start == self.rows.stop:  # Warp has no empty slice at an array's end
+            return array.numpy()[self.rows].copy()
+        return array[self.rows].numpy().copy()
 
     def set(self, name: str, value: Any) -> None:
         """Write a per-particle array of this world."""

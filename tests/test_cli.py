@@ -10,7 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 import particlesim
-from particlesim import cli
+from particlesim import cli, scene_files
+from particlesim.commands import run, shell
 
 SCENE = '''
     """A test scene.
@@ -117,7 +118,7 @@ def test_run_takes_frames_from_the_scene_and_reports_its_error(engine, scene_fil
 
 def test_run_default_frames(engine, scene_file):
     assert cli.main(["run", scene_file(SCENE.replace("frames = 3", ""))]) == 0
-    assert engine.last.frames == cli.DEFAULT_FRAMES
+    assert engine.last.frames == shell.DEFAULT_FRAMES
 
 
 def test_set_reaches_build_and_settings(engine, scene_file):
@@ -178,14 +179,14 @@ def test_scene_file_imports_its_neighbors(engine, scene_file):
     ],
 )  # fmt: skip
 def test_parse_value(text, value):
-    parsed = cli.parse_options([f"name={text}"])["name"]
+    parsed = scene_files.parse_options([f"name={text}"])["name"]
     assert parsed == value and type(parsed) is type(value)
 
 
 @pytest.mark.parametrize("assignment", ["name", "=1", "two words=1", "1=1", ""])
 def test_parse_options_refuses(assignment):
     with pytest.raises(ValueError, match="--set must be NAME=VALUE, got"):
-        cli.parse_options([assignment])
+        scene_files.parse_options([assignment])
 
 
 # Errors
@@ -315,14 +316,14 @@ def test_explain_prints_the_report_as_it_is(engine, scene_file):
 
 def test_list_names_and_describes(scene_file, monkeypatch):
     scenes = {"tiny": Path(scene_file()), "plain": Path(scene_file("x = 1", "plain.py"))}
-    monkeypatch.setattr(cli, "ready_scenes", lambda: scenes)
+    monkeypatch.setattr(run, "ready_scenes", lambda: scenes)
     result = CliRunner().invoke(cli.app, ["list"])
     assert result.exit_code == 0
     assert result.output == "tiny   A test scene.  (known answer)\nplain\n"
 
 
 def test_ready_scenes_are_the_files_of_the_package():
-    scenes = cli.ready_scenes()
+    scenes = scene_files.ready_scenes()
     folder = Path(cli.__file__).parent.parent / "scenes"
     assert list(scenes) == sorted(
         path.stem for path in folder.glob("*.py") if not path.stem.startswith("_")

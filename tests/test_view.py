@@ -171,7 +171,7 @@ def test_one_world_and_worlds_side_by_side(shared, recorded):
     _, arrays = packet(shared, "/frame/2?apart=1")
     _, still = packet(shared, "/still?apart=1")
     shift = arrays["thing.ball"].reshape(WORLDS, -1, 4)[..., :3] - x
-    # Each world as a whole, on the ground, none into another: the boxes are a cell of 1.2 apart.
+    # Each world as a whole, on the ground, none into another: the boxes are 0.2 of their size apart.
     # Single precision rounds at 2^-24 of 2.
     assert np.ptp(shift, axis=1).max() < 1e-6 and np.abs(shift[..., 1]).max() < 1e-6
     corners = still["boundary.edge"].reshape(WORLDS, -1, 3)
@@ -367,7 +367,7 @@ def test_a_recording_that_grows_and_is_replaced(tmp_path):
 
 @pytest.fixture
 def live():
-    running = Live(simulation(), FRAMES, ["density"][:0])
+    running = Live(simulation(), FRAMES, title="drops")
     with Server(running) as server:
         yield server
     running.close()
@@ -383,7 +383,7 @@ def wait_for(condition, seconds=60.0):
 
 def test_a_scene_runs_while_it_is_watched(live):
     scene = get(live, "/scene")
-    assert scene["live"] and scene["frames"] == [0]
+    assert scene["live"] and scene["frames"] == [0] and scene["title"] == "drops"
     assert get(live, "/status")["live"] == {
         "playing": False, "done": 0, "planned": FRAMES, "error": None,
     }  # fmt: skip

@@ -124,8 +124,10 @@ def _passes(parts: Sequence[Pair]) -> dict[int, list[Interaction]]:
     if not parts:
         return {}
     leader = np.array([part.pairs.leader for part in parts])
-    # Where a part looks for nothing it goes with whom it goes elsewhere.
-    leader = np.where(leader < 0, leader.max(axis=1, keepdims=True), leader)
+    # Where a part looks for nothing it goes with whom it goes elsewhere, if that is anywhere.
+    elsewhere = leader.max(axis=1, keepdims=True)
+    alone = -1 - np.arange(len(parts))[:, None]
+    leader = np.where(leader < 0, np.where(elsewhere < 0, alone, elsewhere), leader)
     patterns, pattern_of = np.unique(leader, axis=1, return_inverse=True)
     active: dict[tuple[int, ...], np.ndarray] = {}
     for number, pattern in enumerate(patterns.T):

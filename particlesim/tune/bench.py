@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from ..tradeoff.judges import Judge
 from ..tradeoff.plan import Study
 from ..tradeoff.run import Run
 from ..tradeoff.sweep import choose_judge, measure
 from .report import Trial, finite
 
 SEED = "seed"  # the option of build that makes another of the same kind
+WEIGHED, WEIGHINGS = 4, 3  # frames of a run that is only weighed, and how often
 
 
 class Bench:
@@ -51,8 +55,9 @@ class Bench:
     def _tried(self, values: Mapping[str, Any]) -> Trial:
         runs = []
         for study, reference in zip(self.studies, self.references, strict=True):
-            run = self._run(study, values)
-            judge = choose_judge(study, [run.plan], self.by, reference)
+            plan = study.plan(values)
+            run = Run(plan, study.simulation(plan))
+            judge = choose_judge(study, [plan], self.by, reference)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # of errors that are not finite: they count
                 measure([run], judge, 1, None)
@@ -61,33 +66,36 @@ class Bench:
             if run.cause:
                 break  # once is enough to be out
         # All do the same work; what disturbs only slows.
-        cost = min((min(run.costs) for run in runs if run.costs), default=float("inf"))
+        cost = min((min(run.costs) for run in runs if run.costs), default=math.inf)
         plan = runs[0].plan
         return Trial(
             values=dict(values),
             settings=plan.settings,
             options={name: value for name, value in plan.options.items() if name != SEED},
-            error=max(float("inf") if run.cause else finite(run.error) for run in runs),
+            error=max(math.inf if run.cause else finite(run.error) for run in runs),
             cost=cost,
             cause=next((run.cause for run in runs if run.cause), ""),
         )
 
-    def costs(self, trials: Sequence[Trial], repeats: int) -> list[float]:
-        """Median costs, measured in turn."""
-        runs = [self._run(self.studies[0], trial.values) for trial in trials]
-        judge = choose_judge(
-            self.studies[0], [run.plan for run in runs], _nothing, None
-        )  # the errors are known
-        measure(runs, judge, repeats, None)
-        return [float(np.median(run.costs)) if run.costs else float("inf") for run in runs]
+    def weigh(self, chosen: Sequence[Mapping[str, Any]]) -> list[float]:
+        """Costs of few frames of each, the least of several in turn."""
+        return self.costs(chosen, WEIGHINGS, frames=WEIGHED)
 
-    def _run(self, study: Study, values: Mapping[str, Any]) -> Run:
-        plan = study.plan(values)
-        return Run(plan, study.simulation(plan))
+    def costs(
+        self, chosen: Sequence[Mapping[str, Any]], repeats: int, frames: int | None = None
+    ) -> list[float]:
+        """Wall seconds per simulated second, measured in turn; the least, as disturbance adds.
 
-
-def _nothing(sim: Any) -> float:
-    return 0.0
+        Infinite where it fails.
+        """
+        study = self.studies[0]
+        runs = []
+        for values in chosen:
+            plan = study.plan(values)
+            plan = replace(plan, frames=plan.frames if frames is None else frames)
+            runs.append(Run(plan, study.simulation(plan)))
+        measure(runs, Judge(), repeats, None)
+        return [min(run.costs) if run.costs and not run.cause else math.inf for run in runs]
 
 
 def with_seeds(

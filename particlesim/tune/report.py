@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..settings import Settings
-from ..tradeoff.output import shown
 
 
 @dataclass(frozen=True)
@@ -33,8 +32,11 @@ class Trial:
     cause: str = ""
 
     def __str__(self) -> str:
-        knobs = ", ".join(f"{name}={shown(value)}" for name, value in self.values.items())
-        return f"{knobs}: error {shown(self.error)}, {self.cost:.3g} s per s"
+        knobs = ", ".join(
+            f"{name}={value:.4g}" if isinstance(value, float) else f"{name}={value}"
+            for name, value in self.values.items()
+        )
+        return f"{knobs}: error {self.error:.3g}, {self.cost:.3g} s per s"
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,7 @@ def side_by_side(boxes: dict[int, np.ndarray], up: np.ndarray) -> dict[int, np.n
         up: (3,).
     """
     size = np.max([each[1] - each[0] for each in boxes.values()], axis=0)
-    size = np.where(size > 0, size, float(size.max()) or 1.0)
+    size = size + GAP * (float(size.max()) or 1.0)
     deep = 1 if up[2] > 0.5 else 2
     columns = int(np.ceil(np.sqrt(len(boxes))))
     shifts = {}
@@ -88,7 +88,7 @@ def side_by_side(boxes: dict[int, np.ndarray], up: np.ndarray) -> dict[int, np.n
         cell[0] = k % columns
         # Away from the camera, which looks along -z, or y.
         cell[deep] = k // columns * (1.0 if deep == 1 else -1.0)
-        shifts[world] = (1.0 + GAP) * cell * size
+        shifts[world] = cell * size
     return shifts
 
 

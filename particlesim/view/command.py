@@ -64,7 +64,7 @@ def _source(
             footage.check_field(color)
         return footage
     sim, frames = simulate()
-    return Live(sim, frames, fields_of(sim, color))
+    return Live(sim, frames, fields_of(sim, color), Path(name).stem)
 
 
 def fields_of(sim: Any, color: str | None) -> list[str]:

@@ -24,10 +24,11 @@ class Live:
         sim: The simulation; it belongs to the view until that is closed.
         frames: How many frames to run.
         fields: Names of further values to record, to colour by.
+        title: What the page calls it.
     """
 
-    def __init__(self, sim: Simulation, frames: int, fields: Iterable[str] = ()):
-        self.sim, self.frames, self.fields = sim, frames, tuple(fields)
+    def __init__(self, sim: Simulation, frames: int, fields: Iterable[str] = (), title: str = ""):
+        self.sim, self.frames, self.fields, self.title = sim, frames, tuple(fields), title
         self.take, self.done, self.playing = 0, 0, False
         self.error: str | None = None
         self._folder = tempfile.TemporaryDirectory(

@@ -110,7 +110,8 @@ class Server:
 
     def scene(self) -> dict[str, Any]:
         """What there is."""
-        return {**self.footage.scene(), "live": self.live is not None, "color": self.color}
+        found = {**self.footage.scene(), "live": self.live is not None, "color": self.color}
+        return found if self.live is None else {**found, "title": self.live.title}
 
     def status(self, since: int) -> dict[str, Any]:
         """The frames after the first ``since``, and what a running scene does."""

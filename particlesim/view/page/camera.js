@@ -57,8 +57,9 @@ export class Camera {
     this.distance = bounded;
   }
 
-  // See all of a box from where the camera looks; below: part of the picture's height that is taken.
-  fit(box, aspect, below) {
+  // See all of a box from where the camera looks; parts of the picture's height and width
+  // are taken by what is below and on the right.
+  fit(box, aspect, below = 0, right = 0) {
     const [lower, upper] = box;
     this.target = lower.map((x, k) => 0.5 * (x + upper[k]));
     this.size = length(minus(upper, lower)) || 1;
@@ -67,10 +68,10 @@ export class Camera {
     for (let k = 0; k < 8; k++) {
       const corner = minus([0, 1, 2].map((i) => ((k >> i) & 1 ? upper : lower)[i]), this.target);
       const [x, y, z] = axes.map((axis) => dot(axis, corner));
-      needed = Math.max(needed, Math.max(Math.abs(x) / aspect, Math.abs(y) / (1 - below)) / this.slope + z);
+      needed = Math.max(needed, Math.max(Math.abs(x) / (aspect * (1 - right)), Math.abs(y) / (1 - below)) / this.slope + z);
     }
     this.distance = ROOM * needed || this.size;
-    this.pan(0, 0.5 * below);
+    this.pan(-0.5 * right * aspect, 0.5 * below);
   }
 }
 

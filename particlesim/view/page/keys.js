@@ -7,12 +7,9 @@ export function listen(view) {
   element("reset").addEventListener("click", () => view.reset());
   element("fit").addEventListener("click", () => view.fit());
   element("dismiss").addEventListener("click", () => view.panel.complain(""));
-  element("slider").addEventListener("input", ({ target }) => {
-    view.state.playing = false;
-    view.go(target.valueAsNumber);
-  });
-  const worlds = [null, ...view.scene.worlds];
+  element("slider").addEventListener("input", ({ target }) => view.stepTo(target.valueAsNumber));
   const turnWorld = (step) => {
+    const worlds = [null, ...view.scene.worlds];
     const at = worlds.indexOf(view.state.world) + step;
     if (worlds.length > 2 && at >= 0 && at < worlds.length) view.change({ world: worlds[at] });
   };
@@ -28,9 +25,10 @@ export function listen(view) {
     r: () => view.live && view.reset(),
   };
   window.addEventListener("keydown", (event) => {
-    const typing = event.target.matches?.("select, input:not([type=range]):not([type=checkbox])");
+    const typing = event.target.matches?.("select, input[type=number]");
+    const pressed = event.key === " " && event.target.matches?.("button:not(#play), [type=checkbox]");
     const work = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-    if (!work || typing || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (!work || typing || pressed || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     work(event);
   });

@@ -65,7 +65,10 @@ export class Panel {
     element("legend").hidden = state.color === null && !this.scene.groups.length;
     if (state.color === null) return;
     element("scale-name").textContent = state.color;
-    for (const end of ["low", "high"]) element(end).value = Number(state[end].toPrecision(4));
+    for (const end of ["low", "high"]) {
+      // Not while a person writes there.
+      if (document.activeElement !== element(end)) element(end).value = Number(state[end].toPrecision(4));
+    }
     const bar = element("scale-bar");
     const painter = bar.getContext("2d");
     const steps = this.scene.maps[state.map];

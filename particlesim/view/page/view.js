@@ -27,6 +27,7 @@ class View {
     this.moved = 0; // when the camera was moved last
     this.pace = 0; // milliseconds a picture, of late
     this.pictures = 0; // drawn so far
+    this.turn = 0; // of asking for frames anew
     this.live = null;
   }
 
@@ -38,9 +39,10 @@ class View {
     });
     await this.open();
     const { start, state, film } = this;
-    if (start.has("world")) state.world = Number(start.get("world"));
+    const [world, color] = [Number(start.get("world") ?? NaN), start.get("color")];
+    if (this.scene.worlds.includes(world)) state.world = world;
     if (start.has("frame")) state.index = Math.max(0, film.codes.indexOf(Number(start.get("frame"))));
-    state.color = start.get("color") ?? this.scene.color;
+    state.color = this.scene.fields.includes(color) ? color : this.scene.color;
     await this.requery();
     attach(() => this.camera, this.canvas, () => this.touch(), () => this.fit());
     listen(this);
@@ -77,21 +79,18 @@ class View {
   // Ask for frames anew, as the state wants them.
   async requery() {
     const { state, film } = this;
+    const turn = ++this.turn;
     try {
       if (state.color && state.auto) {
-        [state.low, state.high] = await (await ask(`span?color=${encodeURIComponent(state.color)}`)).json();
+        const span = await (await ask(`span?color=${encodeURIComponent(state.color)}`)).json();
+        if (turn !== this.turn) return; // there has been another change since
+        [state.low, state.high] = span;
         this.spanned = film.codes.length;
       }
-      const words = new URLSearchParams();
-      if (state.world !== null) words.set("world", state.world);
-      if (state.apart && this.scene.coinciding) words.set("apart", 1);
-      if (state.color) {
-        for (const key of ["color", "map", "low", "high"]) words.set(key, state[key]);
-      }
       film.clear();
-      film.query = words.toString();
+      film.query = this.query();
       const still = unpack(await (await ask(`still?${film.query}`)).arrayBuffer());
-      if (film.query !== words.toString()) return;
+      if (turn !== this.turn) return;
       this.still = still;
       this.painter.upload("still", still);
       this.shown = null;
@@ -100,7 +99,18 @@ class View {
       this.panel.complain(error.message);
     }
     this.panel.show(state);
+    this.present();
     this.fetch();
+  }
+
+  // The state in the words of the server.
+  query() {
+    const { world, apart, color, map, low, high } = this.state;
+    const words = new URLSearchParams();
+    if (world !== null) words.set("world", world);
+    if (apart && this.scene.coinciding) words.set("apart", 1);
+    for (const [key, value] of Object.entries(color ? { color, map, low, high } : {})) words.set(key, value);
+    return words.toString();
   }
 
   // Frames that will be needed.
@@ -130,7 +140,7 @@ class View {
   present() {
     const { index } = this.state;
     const packet = this.film.get(index);
-    if (!packet || this.shown === index) return;
+    if (!packet || !this.still || this.shown === index) return;
     this.painter.upload("frame", packet);
     this.frame = packet;
     this.shown = index;
@@ -194,7 +204,11 @@ class View {
     try {
       const since = this.film.codes.length;
       await this.news(await (await ask(`status?since=${since}`)).json(), since);
-      if (this.lost) this.panel.complain("");
+      if (this.lost) {
+        this.panel.complain("");
+        this.film.refused.clear();
+        this.fetch();
+      }
       this.lost = false;
     } catch (error) {
       this.lost = true;
@@ -215,9 +229,7 @@ class View {
     }
     const failed = live?.error && live.error !== this.live?.error;
     this.live = live;
-    if (failed) {
-      this.panel.complain(live.error);
-    }
+    if (failed) this.panel.complain(live.error);
     // The range of a value is known better with more frames.
     const { color, auto } = this.state;
     if (live && color && auto && this.film.codes.length >= 2 * this.spanned) await this.requery();
@@ -234,8 +246,10 @@ class View {
 
   fit() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
-    const below = Math.min(0.3, (height - element("slider").parentElement.offsetTop) / height);
-    this.camera.fit(this.box, width / height, below);
+    const below = (height - element("footer").offsetTop) / height;
+    const right = (width - element("panel").offsetLeft) / width;
+    // On a small page they may lie on the picture.
+    this.camera.fit(this.box, width / height, below < 0.3 ? below : 0, right < 0.3 ? right : 0);
     this.fitted = true;
     this.refit = false;
     this.touch();
@@ -271,7 +285,7 @@ class View {
       const last = state.index >= film.codes.length - 1;
       if (last && (this.live || film.codes.length < 2)) {
         this.due = 1;
-        if (!this.live || !this.live.playing) this.rest();
+        if (!this.live || this.live.error || this.live.done >= this.live.planned) this.rest();
         return;
       }
       const next = last ? 0 : state.index + 1;

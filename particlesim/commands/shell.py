@@ -1,0 +1,144 @@
+"""What commands share: their words, one line for whatever goes wrong, and a quiet start."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import tempfile
+import traceback
+from collections.abc import Iterator
+from types import ModuleType
+from typing import Annotated, Any
+
+import typer
+
+from ..progress import Meter
+from ..scene_files import parse_options, split_options
+
+DEFAULT_FRAMES = 240
+PACKAGE = os.path.dirname(os.path.dirname(__file__))
+
+SceneName = Annotated[
+    str, typer.Argument(metavar="SCENE", help="A ready scene's name, or the path of a scene file.")
+]
+Options = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Set an option of the scene's build, or a field of its settings; may be repeated.",
+    ),
+]
+Device = Annotated[
+    str | None, typer.Option(help="cpu, cuda or cuda:N. Default: CUDA if there is one, else cpu.")
+]
+Worlds = Annotated[
+    int | None, typer.Option(min=1, help="Run this many copies of the scene at once.")
+]
+Precision = Annotated[str | None, typer.Option(help="float32 or float64, in every kernel.")]
+Substeps = Annotated[int | None, typer.Option(min=1, help="Substeps a frame.")]
+Frames = Annotated[
+    int | None, typer.Option(min=1, help="Frames to run. Default: the scene's own, or 240.")
+]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace outputs that exist.")]
+Debug = Annotated[bool, typer.Option("--debug", hidden=True, help="Show tracebacks.")]
+
+
+def assigned(options: list[str] | None, precision: str | None, substeps: int | None) -> list[str]:
+    """All that is to be set: ``--precision`` and ``--substeps`` are short for a ``--set``."""
+    short = {"precision": precision, "substeps": substeps}
+    return [*(options or []), *(f"{name}={short[name]}" for name in short if short[name])]
+
+
+def given(**options: Any) -> dict[str, Any]:
+    """The options that were given: not None, False, empty or the one that says all."""
+    return {
+        name: value
+        for name, value in options.items()
+        if value is True or value not in (None, False, 1, [])
+    }
+
+
+def simulation(
+    module: ModuleType,
+    assignments: list[str],
+    device: str | None,
+    worlds: int | None,
+) -> Any:
+    """The scene with its options and settings, on a device."""
+    import particlesim
+
+    options, knobs = split_options(module, parse_options(assignments))
+    settings = module.settings.replace(**knobs)
+    scene = module.build(**options)
+    return particlesim.Simulation(scene, settings, device=device, worlds=worlds)
+
+
+def start_warp_quietly() -> None:
+    """Start Warp, without a line for each module it loads and one for CUDA that is not there.
+
+    The latter is printed by its C code past every log level, so it is taken out of the stream.
+    """
+    import warp
+
+    warp.config.log_level = warp.LOG_WARNING
+    stream = os.dup(2)
+    with tempfile.TemporaryFile() as printed:
+        os.dup2(printed.fileno(), 2)
+        try:
+            warp.init()
+        finally:
+            os.dup2(stream, 2)
+            os.close(stream)
+        printed.seek(0)
+        for line in printed.read().decode(errors="replace").splitlines():
+            if "Could not find or load the NVIDIA CUDA driver" not in line:
+                typer.echo(line, err=True)
+
+
+@contextlib.contextmanager
+def one_line_errors(meter: Meter, debug: bool) -> Iterator[None]:
+    """Turn whatever goes wrong into one line and an exit code.
+
+    Before the first frame is done it is the arguments (2), unless the engine says that it failed:
+    a RuntimeError or no memory (1). After that it is the run (1).
+    """
+    try:
+        yield
+    except (typer.Exit, typer.TyperException):
+        raise
+    except BrokenPipeError:
+        # Who reads has what they wanted, as head does. Nothing may be left to flush at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise typer.Exit(0) from None
+    except KeyboardInterrupt:
+        complain(f"interrupted after {meter.done} of {meter.frames} frames")
+        raise typer.Exit(130) from None
+    except Exception as error:
+        if debug:
+            traceback.print_exc()
+        complain(describe(error))
+        failed = meter.done > 0 or isinstance(error, RuntimeError | MemoryError)
+        raise typer.Exit(1 if failed else 2) from None
+
+
+def describe(error: Exception) -> str:
+    if isinstance(error, OSError) and error.filename and error.strerror:
+        return f"{error.filename}: {error.strerror}"
+    if isinstance(error, ValueError | OSError | RuntimeError) and str(error):
+        return str(error)
+    if isinstance(error, ImportError) and error.name is None:  # an extra that is not installed
+        return str(error)
+    # Not written to be read alone: say what it is, and where the scene, or else the engine, was.
+    text = f"{type(error).__name__}: {error}"
+    if not isinstance(error, SyntaxError):
+        places = traceback.extract_tb(error.__traceback__)
+        outside = [p for p in places if not p.filename.startswith(PACKAGE)]
+        place = (outside or places)[-1]
+        text += f" ({os.path.basename(place.filename)}, line {place.lineno})"
+    return f"{text}; --debug shows the traceback"
+
+
+def complain(message: str) -> None:
+    typer.echo(f"error: {' '.join(message.split())}", err=True)
