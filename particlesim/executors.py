@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import time
 import warnings
@@ -102,18 +101,20 @@ class ThreadExecutor:
 def _steps(program: Program, team: Team, threads: int) -> list[Callable[[], None]]:
     """A program as functions to call in turn: launches without a gap are one of them."""
     steps: list[Callable[[], None]] = []
-    for is_launch, group in itertools.groupby(
-        program.operations, lambda operation: isinstance(operation, Launch)
-    ):
-        operations = list(group)
-        if is_launch:
-            steps.append(_Run(operations, team, threads).run)
+    launches: list[Launch] = []
+    for operation in program.operations:
+        if isinstance(operation, Launch):
+            launches.append(operation)
             continue
-        for operation in operations:
-            if isinstance(operation, When):
-                steps.append(_If(operation.flag, _steps(operation.body, team, threads)).run)
-            else:
-                steps.append(operation.function)
+        if launches:
+            steps.append(_Run(launches, team, threads).run)
+            launches = []
+        if isinstance(operation, When):
+            steps.append(_If(operation.flag, _steps(operation.body, team, threads)).run)
+        else:
+            steps.append(operation.function)
+    if launches:
+        steps.append(_Run(launches, team, threads).run)
     return steps
 
 

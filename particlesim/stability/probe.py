@@ -188,7 +188,8 @@ class Probe:
             moved[mobile] = root * q.reshape(-1, 3)
             moved *= step / max(np.linalg.norm(moved, axis=1).max(), 1e-300)
             ahead, behind = ((at + way * moved).astype(real).astype(float) for way in (1, -1))
-            gain = self.force(parts, **{what: ahead}) - self.force(parts, **{what: behind})
+            with np.errstate(invalid="ignore", over="ignore"):  # not finite: told as such
+                gain = self.force(parts, **{what: ahead}) - self.force(parts, **{what: behind})
             twice = 2.0 * np.linalg.norm(((ahead - behind)[mobile] / root).ravel()) or 1.0
             done = (ahead - behind)[mobile] / root
             return 2.0 * done.ravel() / twice, (-2.0 / twice * root * gain[mobile]).ravel()

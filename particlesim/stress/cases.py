@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -49,9 +50,7 @@ def _steps(settings: Settings) -> list[Case]:
     ]
     for part in (2, 4, 16):
         if settings.substeps // part > 1:
-            found.append(
-                Case(f"substeps / {part}", lambda s, n=part: s.replace(substeps=s.substeps // n))
-            )
+            found.append(Case(f"substeps / {part}", _knob("substeps", settings.substeps // part)))
     return [*found, Case("substeps = 1", lambda s: s.replace(substeps=1))]
 
 
@@ -69,11 +68,15 @@ def _knobs(settings: Settings) -> list[Case]:
         "threads": (1, 2 * (os.cpu_count() or 1)),
     }
     return [
-        Case(f"{name} = {value}", lambda s, n=name, v=value: s.replace(**{n: v}))
+        Case(f"{name} = {value}", _knob(name, value))
         for name, values in ends.items()
         for value in values
         if value != getattr(settings, name)
     ]
+
+
+def _knob(name: str, value: Any) -> Callable[[Settings], Settings]:
+    return lambda settings: settings.replace(**{name: value})
 
 
 def _states() -> list[Case]:
