@@ -194,8 +194,9 @@ def boundary_kernels(
         e = kept(i, b)
         back, N = meet(i, w, x, e, h.slack[k] * timed, p, h)
         dx = vec3()
-        for a in range(wp.static(sides)):
-            dx = dx + N[a] * back[a]
+        if wp.max(back) > real(0.0):  # few do
+            for a in range(wp.static(sides)):
+                dx = dx + N[a] * back[a]
         if timed * p.friction > real(0.0):
             u = b.v[i] * dt + b.correction[i]
             dx = dx - rub(k, slip_of(x, u, dt, w, h), back, N, p.friction, h)
@@ -221,16 +222,17 @@ def boundary_kernels(
             x = b.x[i]
             c = b.correction[i]
             back, N = meet(i, w, x, kept(i, b) - c, h.slack[k], p, h)
-            v = velocity_of(x, b.v[i], w, h)
-            before = v - c * inverse_dt
-            if wp.static(forces):
-                before = before - f[i] * (b.w[i] * dt)
-            dv = vec3()
-            for a in range(wp.static(sides)):
-                if back[a] > real(0.0):
-                    n = N[a]
-                    now = wp.dot(v + dv, n)
-                    dv = dv + n * rebound(wp.dot(before, n), now, p.restitution)
-            b.v[i] = b.v[i] + dv
+            if wp.max(back) > real(0.0):
+                v = velocity_of(x, b.v[i], w, h)
+                before = v - c * inverse_dt
+                if wp.static(forces):
+                    before = before - f[i] * (b.w[i] * dt)
+                dv = vec3()
+                for a in range(wp.static(sides)):
+                    if back[a] > real(0.0):
+                        n = N[a]
+                        now = wp.dot(v + dv, n)
+                        dv = dv + n * rebound(wp.dot(before, n), now, p.restitution)
+                b.v[i] = b.v[i] + dv
 
     return SimpleNamespace(begin=begin_boundary, project=project_boundary, bounce=bounce_boundary)

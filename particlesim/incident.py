@@ -11,8 +11,8 @@ from .limits import ESCAPED, FAST, FINITE
 
 WHAT = {
     FINITE: "position and velocity must stay finite",
-    ESCAPED: "position must stay within the bounds of the scene and of what its numbers resolve",
-    FAST: "velocity must have a cause that finer substeps agree on",
+    ESCAPED: "position must stay within the bounds of the scene and what its numbers resolve, {}",
+    FAST: "velocity beyond {} must have a cause that finer substeps agree on",
 }
 DONE = {
     "stop": "stopped at the last good frame",
@@ -29,8 +29,8 @@ class Incident:
     particle counts within the world. frame: how many were good before. start, stop: times of the
     frame [s]. substep: the first after which it was so, of ``of`` substeps, from 1; ``time``: at
     its end [s]. part: the interaction or constraint that did it; None: the motion itself.
-    position, velocity: of the particle after that substep. action: ``"stop"``, ``"retry"`` or
-    ``"freeze"``; substeps: how many the frame was done with in the end.
+    position, velocity: of the particle after that substep. limit: what it has passed. action:
+    ``"stop"``, ``"retry"`` or ``"freeze"``; substeps: how many the frame was done with in the end.
     """
 
     kind: str
@@ -63,7 +63,7 @@ class Incident:
     def found(self) -> str:
         """What was found, without what was done."""
         kinds = {"not finite": FINITE, "escaped": ESCAPED, "runaway": FAST}
-        what = WHAT[kinds[self.kind]] + self.limit
+        what = WHAT[kinds[self.kind]].format(self.limit)
         x, v = (np.array2string(np.array(each)) for each in (self.position, self.velocity))
         look = f"look at {self.part}, which did it" if self.part else "look at how fast it moves"
         return (

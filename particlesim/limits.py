@@ -8,8 +8,8 @@ pace is raised then.
 
 Far: outside ``Scene(bounds=...)``; or where the last bit of a coordinate is more than half the skin
 of the scene's neighbour lists or the smallest radius, so that nobody can say any more who touches
-whom; or where squares of distances overflow. A start that is farther out may go twice as far. On
-periodic axes nothing can leave.
+whom. A start that is farther out may go twice as far. On periodic axes nothing can leave, nor where
+there are neither lists nor radii.
 """
 
 from __future__ import annotations
@@ -89,9 +89,7 @@ class Limits:
         smallest = self._by_world(np.fmin, np.where(radius > 0, radius, np.nan))
         lengths = [0.5 * (each.reach - each.cutoff) for each in neighbors.verlet]
         lengths += [np.where(smallest > 0, smallest, np.inf)]
-        numbers = np.finfo(self.model.precision.numpy)
-        squared = 0.25 * np.sqrt(float(numbers.max))  # of the difference of two coordinates
-        return np.minimum(np.min(lengths, axis=0) / float(numbers.eps), squared)
+        return np.min(lengths, axis=0) / float(np.finfo(self.model.precision.numpy).eps)
 
     def reset(self, worlds: Iterable[int]) -> None:
         """These worlds are at their start again."""

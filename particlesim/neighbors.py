@@ -28,11 +28,10 @@ class Request:
 
     members: np.ndarray
     cutoff: np.ndarray | None
-    names: set[str]
     for_constraint: bool
     leader: np.ndarray
     widest: np.ndarray
-    served_by: AllPairs | None = field(default=None, repr=False)
+    served_by: AllPairs = field(init=False, repr=False)
 
     def meets(self, other: Request) -> np.ndarray:
         """In which worlds both share a list."""
@@ -67,22 +66,22 @@ class Neighbors:
         """
         worlds = self.model.world_count
         new = Request(
-            members, cutoff, names, for_constraint, np.full(worlds, -1),
+            members, cutoff, for_constraint, np.full(worlds, -1),
             np.zeros(worlds) if cutoff is None else cutoff.astype(float),
         )  # fmt: skip
         self._choose_leaders(new)
-        self.requests.append(new)
         found = self._fitting(new)
         if found is None:
             found = (AllPairs if cutoff is None else VerletList)(self.model, members)
             self.lists.append(found)
-        new.served_by = found
         found.request(names)
         found.users.append(user)
-        for other in self.requests[:-1]:
+        for other in self.requests:
             # One pass for both, where they share, reads what both need from the list of the first.
             if other.served_by is not found and other.meets(new).any():
                 other.served_by.request(names)
+        new.served_by = found
+        self.requests.append(new)
         return found
 
     def _choose_leaders(self, new: Request) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from . import validate
+from .errors import SimulationError
 from .history import History, check_output
 from .progress import Meter
 from .recorders import BackgroundWriter, Recorder, open_recorder
@@ -137,6 +138,8 @@ class Recording:
         # Finished frames are kept; the first error is the one to see.
         with contextlib.suppress(Exception):
             self.background.close()
+            if isinstance(error, SimulationError) and self.checkpoints is not None:
+                self.checkpoints.capture(self.recorded)()  # of the last good frame
         with contextlib.suppress(Exception):
             self.recorder.close()
 

@@ -105,7 +105,7 @@ class Simulation(Reading):
             self.observers.all.append(self.accounts)
         self.snapshot = Snapshot(self)
         self.watchdog = Watchdog(model, self.neighbors)
-        self.incidents: list[Incident] = []
+        self.incidents: list[Incident] = []  # what the watchdog has found, and done about it
         self.frames = Frames()
         self._unknown_forces = set(range(model.world_count))
 

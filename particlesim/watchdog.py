@@ -128,8 +128,8 @@ class Watchdog:
         host, w = self.limits.host, culprit.world
         if culprit.kind == ESCAPED:
             lower, upper = (np.array2string(host[name][w]) for name in ("lower", "upper"))
-            return f" [{lower} to {upper}]"
-        return f" beyond {host['speed'][w]:g}" if culprit.kind == FAST else ""
+            return f"{lower} to {upper}"
+        return f"{host['speed'][w]:g}" if culprit.kind == FAST else ""
 
     def _stop(self, sim: Simulation, culprits: list[Culprit], substeps: int | None = None) -> None:
         """Raise, from the last good frame; ``substeps``: which did not help either."""
@@ -144,8 +144,8 @@ class Watchdog:
         if substeps:
             text += f"; even {substeps} substeps do not help"
         if len(incidents) > 1:
-            others = ", ".join(str(each.world) for each in incidents[1:5])
-            text += f"; so in {len(incidents) - 1} other worlds ({others}...)"
+            worlds = [str(each.world) for each in incidents[1:]]
+            text += f"; and worlds {', '.join(worlds[:4])}{', ...' if len(worlds) > 4 else ''} too"
         raise SimulationError(f"{text}.")
 
     def _report(self, sim: Simulation, culprits: list[Culprit], action: str, substeps: int) -> None:

@@ -94,13 +94,13 @@ def test_time_stays_where_dt_varies(refused):
 
 
 def test_what_diverges_is_marked_and_kept():
-    # omega h = 2.5 and 10: the amplitude grows by 4 and by 98 a substep, past any float.
+    # omega h = 2.5 and 10: the amplitude grows by 4 and by 98 a substep, which no finer step does.
     table = sweep(
         oscillator, {"substeps": [4, 1, 8]}, error="energy", frames=1000,
         settings=EXACT.replace(dt=1.0), repeats=2,
     )  # fmt: skip
     assert [r["substeps"] for r in table.diverged] == [4, 1]
-    assert all("must stay finite" in r.cause and r.costs for r in table.diverged)
+    assert all("must have a cause" in r.cause for r in table.diverged)
     assert table.fastest_stable()["substeps"] == 8
     assert str(table).count("diverged") == 2 + 2
 

@@ -171,7 +171,7 @@ def test_one_world_and_worlds_side_by_side(shared, recorded):
     _, arrays = packet(shared, "/frame/2?apart=1")
     _, still = packet(shared, "/still?apart=1")
     shift = arrays["thing.ball"].reshape(WORLDS, -1, 4)[..., :3] - x
-    # Each world as a whole, on the ground, none into another: the boxes are 0.2 of their size apart.
+    # Each world as a whole, on the ground, none into another: they have gaps.
     # Single precision rounds at 2^-24 of 2.
     assert np.ptp(shift, axis=1).max() < 1e-6 and np.abs(shift[..., 1]).max() < 1e-6
     corners = still["boundary.edge"].reshape(WORLDS, -1, 3)
@@ -410,6 +410,10 @@ def test_pause_and_reset(live):
     assert status["live"]["done"] == 0 and not status["live"]["playing"]
     assert np.array_equal(packet(live, "/frame/0")[1]["thing.ball"], start)
     refusal(live, "/frame/1", 404)
+    # Takes do not pile up: this one and the one before are kept.
+    for _ in range(3):
+        get(live, "/live/reset", "POST")
+    assert len(list(live.footage.path.parent.glob("*.usda"))) == 2
     get(live, "/live/play", "POST")
     wait_for(lambda: get(live, "/status")["live"]["done"] == FRAMES)
 

@@ -10,6 +10,7 @@ import warp as wp
 
 import particlesim as ps
 from particlesim import audit, verlet
+from particlesim.resume import checkpoint_path
 from particlesim.watchdog import Watchdog
 
 G = 9.81
@@ -134,7 +135,7 @@ def test_a_spring_past_its_limit_is_a_runaway(precision, device):
     sim = ps.Simulation(
         oscillator(2.5), ps.Settings(dt=4.0, substeps=4, precision=precision), device=device
     )
-    with pytest.raises(ps.SimulationError, match="velocity must have a cause") as caught:
+    with pytest.raises(ps.SimulationError, match="must have a cause that finer") as caught:
         sim.step()
     assert "of particle 1 in world 0" in str(caught.value)
     assert "look at Springs, which did it" in str(caught.value)
@@ -212,6 +213,19 @@ def test_a_watchdog_that_is_off_looks_at_nothing(device):
     assert look.owner == "watchdog"
 
 
+def test_a_run_that_stops_leaves_its_last_good_frame(device, tmp_path):
+    scene = drifting(ps.ParticleForce(spoiled, [1], when=0.35, push=1e15))
+    sim = ps.Simulation(scene, ps.Settings(dt=0.1), device=device)
+    out = tmp_path / "run.npz"
+    with pytest.raises(ps.SimulationError, match=r"between t = 0.3 and 0.4"):
+        sim.run(10, record=out, checkpoint=1000)
+    assert sim.frame == 3
+    assert out.exists()
+    saved = ps.Simulation.load(checkpoint_path(out), scene, device=device)
+    assert saved.frame == 3
+    same(saved, sim)
+
+
 # What has a cause -------------------------------------------------------------------------------
 
 
@@ -283,7 +297,7 @@ def test_a_coarse_explosion_is_not_excused_by_a_finer_one(precision, device):
             oscillator(omega, 1e-3), ps.Settings(dt=3.0, substeps=3, precision=precision),
             device=device,
         )  # fmt: skip
-        with pytest.raises(ps.SimulationError, match="velocity must have a cause"):
+        with pytest.raises(ps.SimulationError, match="must have a cause that finer"):
             quietly(sim, 3)
 
 

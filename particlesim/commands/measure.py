@@ -1,4 +1,4 @@
-"""The commands tradeoff and stress."""
+"""The commands tradeoff, tune and stress."""
 
 from __future__ import annotations
 
@@ -60,6 +60,37 @@ def tradeoff(
         )  # fmt: skip
         typer.echo(str(table))
         command.write(table, plot, save)
+
+
+def tune(
+    scene: SceneName,
+    error: Annotated[float, typer.Option(help="The error to stay under.")] = 1e-3,
+    by: Annotated[
+        str | None,
+        typer.Option(help="known, converged, energy or momentum. Default: known if it is."),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE,...", help="Values of a setting or option; repeat."),
+    ] = None,
+    options: Options = None,
+    frames: Frames = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Seeds to try everything with.")] = 2,
+    device: Device = None,
+    debug: Debug = False,
+) -> None:
+    """Find the cheapest settings under an error, and print them as Python."""
+    meter = Meter()
+    with one_line_errors(meter, debug):
+        from ..tune import command
+
+        if not debug:
+            start_warp_quietly()
+        found = command.search(
+            load_scene(scene), options or (), vary or (), by, meter,
+            error=error, frames=frames, seeds=seeds, device=device,
+        )  # fmt: skip
+        typer.echo(str(found))
 
 
 def stress(

@@ -17,7 +17,7 @@ from ..tradeoff.sweep import choose_judge, measure
 from .report import Trial, finite
 
 SEED = "seed"  # the option of build that makes another of the same kind
-WEIGHED, WEIGHINGS = 4, 3  # frames of a run that is only weighed, and how often
+WEIGHED, WEIGHINGS = 4, 5  # frames of a run that is only weighed, and how often
 
 
 class Bench:

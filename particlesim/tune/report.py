@@ -112,9 +112,10 @@ def line(settings: Settings) -> str:
 
 
 def _fraction(dt: float) -> str:
-    """dt as ``1 / 60`` where that is the very number."""
+    """dt as ``1 / 60`` where that is the very number, and shorter."""
     whole = round(1.0 / dt) if dt > 0 and 1.0 / dt < 1e6 else 0
-    return f"1 / {whole}" if whole > 1 and 1.0 / whole == dt else repr(dt)
+    exact = whole > 1 and 1.0 / whole == dt
+    return min([repr(dt), *([f"1 / {whole}"] if exact else [])], key=len)
 
 
 def finite(value: float) -> float:

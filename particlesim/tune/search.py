@@ -6,10 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..integrators import METHODS
 from .bench import Bench
 from .report import Trial
 
-BETTER = 0.97  # of the cost of the best: below it another setting counts as cheaper
+BETTER = 0.95  # of the cost of the best: below it another setting counts as cheaper
 FLOOR = 0.8  # of the error at a quarter of the substeps; what falls less has reached its floor
 STRIDE = 4.0  # largest jump in substeps, up or down
 RESOLUTION = 1.1  # between substeps that are told apart
@@ -49,6 +50,7 @@ class Search:
         """Search from about ``start`` substeps; None if nothing suffices."""
         level = self._level(start)
         self._weigh(level)
+        self.mode = self._promising(level)
         self._least(self.mode, level, len(self.levels) - 1)
         changed = True
         while changed:
@@ -59,6 +61,21 @@ class Search:
                     if value != self.mode[name] and self._improve(mode):
                         self.mode, changed = mode, True
         return self.best
+
+    def _promising(self, level: int) -> dict[str, Any]:
+        """The mode of the integrator that should do with least, by its order, to start from.
+
+        The wrong one may need a thousand times the substeps before another is tried.
+        """
+        prices = {}
+        for integrator in self.ladders.get("integrator", ()):
+            mode = {**self.mode, "integrator": integrator}
+            trial = self.bench.trial({**mode, "substeps": self.levels[level]})
+            excess = max(trial.error / self.target, 1e-6)
+            prices[integrator] = self.price(trial.values) * excess ** (1.0 / self._order(mode, {}))
+        if not prices:
+            return self.mode
+        return {**self.mode, "integrator": min(prices, key=lambda name: prices[name])}
 
     def price(self, values: Mapping[str, Any]) -> float:
         """What settings cost, but for a factor that all share."""
@@ -90,8 +107,11 @@ class Search:
         before = self.best
         even = BETTER * self.price(before.values) / self.price({**mode, "substeps": 1})
         highest = self._level(even, below=True)
-        if highest >= 0 and self._suffices(mode, highest):
-            self._least(mode, highest, highest)
+        same = min(highest, self._level(before.values["substeps"]))
+        for level in sorted({same, highest}):
+            if level >= 0 and self._suffices(mode, level):
+                self._least(mode, level, level)
+                break
         return self.best is not before
 
     def _least(self, mode: dict[str, Any], start: int, highest: int) -> None:
@@ -126,13 +146,13 @@ class Search:
         return min(max(level, low + 1), high - 1)
 
     def _order(self, mode: Mapping[str, Any], seen: Mapping[int, float]) -> float:
-        """Order of convergence, of the two errors next to the target, or of the method."""
+        """Order of convergence, by the two errors nearest to the target, or of the method."""
         usable = [(self.levels[at], error) for at, error in seen.items() if 0 < error < math.inf]
         usable.sort(key=lambda point: abs(math.log(point[1] / self.target)))
         if len(usable) > 1:
             (s0, e0), (s1, e1) = usable[:2]
             return min(max(math.log(e0 / e1) / math.log(s1 / s0), 0.5), 4.0)
-        return 2.0 if mode.get("integrator") == "velocity_verlet" else 1.0
+        return float(METHODS[mode["integrator"]].order) if "integrator" in mode else 1.0
 
     def _stuck(self, seen: Mapping[int, float], at: int) -> bool:
         """More substeps have stopped to help, or there are none."""

@@ -140,7 +140,7 @@ def _ladders(
     polish: dict[str, list[Any]] = {}
     if sim.neighbors.verlet:
         cutoff = float(max(each.cutoff.max() for each in sim.neighbors.verlet))
-        polish["skin"] = [share * cutoff for share in SKINS]
+        polish["skin"] = [float(f"{share * cutoff:.3g}") for share in SKINS]
     polish["compensated"] = [not settings.compensated]
     polish = {name: vary.pop(name, values) for name, values in polish.items()}
     given = vary.pop("substeps", None)

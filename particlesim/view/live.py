@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..record import UsdRecorder
+from ..usd import UsdWriter
 from .footage import Footage
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ class Live:
         self._folder = tempfile.TemporaryDirectory(
             prefix="particlesim-", ignore_cleanup_errors=True
         )
+        self._last: UsdWriter | None = None  # of the take before
         self._wake = threading.Condition()
         self._rewinding = self._closing = False
         try:
@@ -121,8 +123,11 @@ class Live:
         self.sim.reset()
         self.take += 1
         self._begin()
-        for file in [*old.writer.clips.glob("*"), old.writer.path]:
-            file.unlink(missing_ok=True)
+        # The take before may still be being read; it goes the next time.
+        if self._last is not None:
+            for file in [*self._last.clips.glob("*"), self._last.path]:
+                file.unlink(missing_ok=True)
+        self._last = old.writer
         with self._wake:
             self.error, self._rewinding = None, False
             self._wake.notify_all()

@@ -110,15 +110,17 @@ class Server:
 
     def scene(self) -> dict[str, Any]:
         """What there is."""
-        found = {**self.footage.scene(), "live": self.live is not None, "color": self.color}
+        found = {**self.footage.scene(), "live": self._state(), "color": self.color}
         return found if self.live is None else {**found, "title": self.live.title}
 
     def status(self, since: int) -> dict[str, Any]:
         """The frames after the first ``since``, and what a running scene does."""
         footage = self.footage
         footage.refresh()
-        state = self.live.state() if self.live else None
-        return {"take": footage.take, "frames": footage.frames[since:], "live": state}
+        return {"take": footage.take, "frames": footage.frames[since:], "live": self._state()}
+
+    def _state(self) -> dict[str, Any] | None:
+        return None if self.live is None else self.live.state()
 
     def choice(self, words: dict[str, str]) -> Choice:
         """What of a frame is asked for."""

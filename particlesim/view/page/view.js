@@ -56,7 +56,7 @@ class View {
     this.scene = await (await ask("scene")).json();
     this.film.codes = this.scene.frames;
     this.take = this.scene.take;
-    this.live = this.scene.live ? { playing: false, done: 0, planned: 0, error: null } : null;
+    this.live = this.scene.live;
     this.camera ??= new Camera(this.scene.up, this.scene.camera);
     if (this.pictures === 0) this.state.grid = this.scene.floor !== null;
     this.state.index = Math.min(this.state.index, this.film.codes.length - 1);
@@ -284,15 +284,15 @@ class View {
     while (this.due >= 1) {
       const last = state.index >= film.codes.length - 1;
       if (last && (this.live || film.codes.length < 2)) {
-        this.due = 1;
-        if (!this.live || this.live.error || this.live.done >= this.live.planned) this.rest();
-        return;
+        state.playing = this.more;
+        this.due = Math.min(this.due, 1);
+        break;
       }
       const next = last ? 0 : state.index + 1;
       const damaged = film.refused.get(next);
       if (!film.get(next) && !damaged) {
         this.due = 1;
-        return;
+        break;
       }
       this.due -= 1;
       state.index = next;
@@ -303,10 +303,11 @@ class View {
     this.fetch();
   }
 
-  // Nothing more comes: a running scene is at its end, or has failed.
-  rest() {
-    this.state.playing = false;
-    this.showTime();
+  // Whether a running scene may have frames that are not known here yet.
+  get more() {
+    if (!this.live) return false;
+    const { error, done, planned } = this.live;
+    return this.film.codes.length <= done || (!error && done < planned);
   }
 
   resized() {
