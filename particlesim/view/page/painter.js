@@ -10,6 +10,7 @@ const PLANE = 0.4; // of planes, which would hide what is below them
 const KEY = [-0.6, 1.2, 0.8]; // to the light: right, up, towards the camera, level
 const EDGE = [0.2, 0.26, 0.33, 0.8];
 const GRID = 30; // steps from the middle to the end
+const WIDE = 1024; // texels a row, of the textures that spheres come from
 const RING = 5; // pixels to the wider ring of the shading
 
 const unit = (a) => a.map((x) => x / Math.hypot(...a));
@@ -35,14 +36,39 @@ export class Painter {
     const before = this.layers[layer];
     const now = new Map();
     for (const [name, array] of Object.entries(packet.arrays)) {
-      const buffer = before.get(name)?.buffer ?? gl.createBuffer();
+      const { buffer = gl.createBuffer(), table } = before.get(name) ?? {};
       before.delete(name);
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       gl.bufferData(gl.ARRAY_BUFFER, array.values, gl.DYNAMIC_DRAW);
-      now.set(name, { ...array, buffer });
+      now.set(name, { ...array, buffer, table: this.table(name, array, table) });
     }
-    for (const { buffer } of before.values()) gl.deleteBuffer(buffer);
+    for (const { buffer, table } of before.values()) {
+      gl.deleteBuffer(buffer);
+      gl.deleteTexture(table);
+    }
     this.layers[layer] = now;
+  }
+
+  // A texture with a texel for each row of what is drawn as spheres; old: one to use again.
+  table(name, { values, width, count, type }, old) {
+    if (!/\.(ball|cone|wire)(_color)?$/.test(name)) return undefined;
+    const gl = this.gl;
+    const made = old ?? gl.createTexture();
+    const [inside, format] = {
+      uint8: [gl.RGBA8, gl.RGBA], float32: width === 3 ? [gl.RGB32F, gl.RGB] : [gl.RGBA32F, gl.RGBA],
+    }[type];
+    const kind = type === "uint8" ? gl.UNSIGNED_BYTE : gl.FLOAT;
+    const full = Math.floor(count / WIDE);
+    gl.bindTexture(gl.TEXTURE_2D, made);
+    gl.texImage2D(gl.TEXTURE_2D, 0, inside, WIDE, Math.ceil(count / WIDE), 0, format, kind, null);
+    if (full) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDE, full, format, kind, values);
+    const rest = values.subarray(full * WIDE * width);
+    if (rest.length) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, full, count % WIDE, 1, format, kind, rest);
+    for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
+      gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
+    }
+    gl.bindTexture(gl.TEXTURE_2D, null);
+    return made;
   }
 
   // look: camera, box, up, floor (null: no grid), boundaries ("solid", "clear", "edges", "none"),
@@ -115,10 +141,11 @@ export class Painter {
   balls(arrays, name) {
     const array = arrays.get(name);
     if (!array) return;
-    this.use("ball");
-    this.round(array, 0, 1, ["position", "radius"]);
-    this.colors(arrays, name, 0, 1, "color");
-    this.gl.drawArraysInstanced(this.gl.TRIANGLE_STRIP, 0, 4, array.count);
+    const tints = arrays.get(`${name}_color`);
+    this.textures([array.table, tints.table]);
+    this.use("ball", { rows: 0, tints: 1, equal: array.radius ?? -1, tinted: tints.count > 1 });
+    this.gl.drawArrays(this.gl.TRIANGLES, 0, 3 * array.count);
+    this.textures([null, null]);
   }
 
   tubes(arrays, name) {
@@ -165,18 +192,21 @@ export class Painter {
   }
 
   screen(samples) {
+    const ring = RING * samples * Math.max(1, this.canvas.height / 1000);
+    this.textures([this.target.color, this.target.depth]);
+    this.use("screen", { picture: 0, depths: 1, span: ring, samples });
+    this.gl.drawArrays(this.gl.TRIANGLES, 0, 3);
+    this.textures([null, null]);
+  }
+
+  // Put textures where shaders look for them.
+  textures(given) {
     const gl = this.gl;
-    for (const [k, texture] of [this.target.color, this.target.depth].entries()) {
+    for (const [k, texture] of given.entries()) {
       gl.activeTexture(gl.TEXTURE0 + k);
       gl.bindTexture(gl.TEXTURE_2D, texture);
     }
-    const ring = RING * samples * Math.max(1, this.canvas.height / 1000);
-    this.use("screen", { picture: 0, depths: 1, span: ring, samples });
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
-    for (const k of [0, 1]) {
-      gl.activeTexture(gl.TEXTURE0 + k);
-      gl.bindTexture(gl.TEXTURE_2D, null);
-    }
+    gl.activeTexture(gl.TEXTURE0);
   }
 
   // What every shader takes of the camera.
@@ -275,6 +305,7 @@ export class Painter {
       [gl.FLOAT_VEC4]: (p, x) => gl.uniform4fv(p, x),
       [gl.FLOAT_MAT3]: (p, x) => gl.uniformMatrix3fv(p, false, x),
       [gl.INT]: (p, x) => gl.uniform1i(p, x),
+      [gl.BOOL]: (p, x) => gl.uniform1i(p, x),
       [gl.SAMPLER_2D]: (p, x) => gl.uniform1i(p, x),
     };
     const places = {};

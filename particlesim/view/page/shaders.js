@@ -38,20 +38,26 @@ vec4 lit(vec3 normal, vec3 v, vec4 color) {
 }
 `;
 
-// Spheres: a square that just covers one, and the ray through each pixel.
+// Spheres: a triangle that just covers one, and the ray through each pixel. They come from textures,
+// since instances of a few corners each are slow where there is no graphics card.
 const BALL_VERTEX = `${VIEW}
-in vec3 position;
-in float radius;
-in vec4 color;
+uniform highp sampler2D rows;   // center, and radius where it differs
+uniform highp sampler2D tints;
+uniform float equal;   // radius of all; negative: of the rows
+uniform bool tinted;   // each has its own colour
 out vec3 at;
 flat out vec3 center;
 flat out float size;
 flat out vec4 shade;
 
+ivec2 place(int k) { return ivec2(k & 1023, k >> 10); }
+
 void main() {
-  center = seen(position);
-  size = visible(radius, center);
-  shade = color;
+  int ball = gl_VertexID / 3;
+  vec4 row = texelFetch(rows, place(ball), 0);
+  center = seen(row.xyz);
+  size = visible(equal < 0.0 ? row.w : equal, center);
+  shade = texelFetch(tints, place(tinted ? ball : 0), 0);
   float far = dot(center, center), near = far - size * size;
   if (near <= 0.0 || center.z > size) {  // around the eye, or behind it
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
@@ -59,8 +65,9 @@ void main() {
   }
   vec3 w = center * inversesqrt(far);
   vec3 u = normalize(cross(w, abs(w.y) < 0.9 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0)));
-  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
-  at = center + (u * corner.x + cross(u, w) * corner.y) * (size * sqrt(far / near));
+  float turn = 2.0943951 * float(gl_VertexID - 3 * ball);
+  vec3 corner = u * cos(turn) + cross(u, w) * sin(turn);
+  at = center + corner * (2.0 * size * sqrt(far / near));  // its inner circle is the outline
   gl_Position = clipped(at);
 }`;
 
