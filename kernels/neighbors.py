@@ -1,9 +1,9 @@
 """Verlet lists: cell coordinates, rows from a hash grid or by looking at a whole world.
 
 The grid is built in cell coordinates u = turn (x - origin), in which every cell is a unit cube.
-``turn`` scales, and takes the axes in the order that has the grid's order follow the particles' own.
-On a periodic axis it scales by cells / length, so that the grid's wrap by modulo is exactly the
-periodicity of the box, whatever its shape. Slots (the loop's own order) follow the grid's order.
+``turn`` scales, and takes the axes in the order that has the grid's order follow the particles'
+own. On a periodic axis it scales by cells / length, so that the grid's wrap by modulo is exactly
+the periodicity of the box, whatever its shape. Slots (the loop's order) follow the grid's order.
 """
 
 import functools

@@ -12,6 +12,7 @@ from .constraints import (
 )
 from .errors import SimulationError, SimulationWarning
 from .history import History, read_history
+from .incident import Incident
 from .interactions import (
     SPH,
     ArtificialViscosity,
@@ -29,6 +30,7 @@ from .interactions import (
     UniformGravity,
 )
 from .law import Law, law
+from .ledger import Ledger
 from .record import UsdRecorder
 from .render import Camera
 from .scene import Group, Scene
@@ -56,8 +58,10 @@ __all__ = [
     "Gravity",
     "Group",
     "History",
+    "Incident",
     "Interaction",
     "Law",
+    "Ledger",
     "LennardJones",
     "PairForce",
     "PairPotential",

@@ -226,6 +226,12 @@ class SphereBoundary(Boundary):
         ball = {"center": self.center, "radius": self.radius, "container": self.inside}
         return [self._drawn("sphere", **ball)]
 
+    def limits(self, probe: Probe) -> list[Limit]:
+        """By the speed of the particles against the radius."""
+        from ..stability.solids import sphere_limits
+
+        return sphere_limits(self, probe)
+
     def _pivot(self) -> np.ndarray:
         return self.center
 

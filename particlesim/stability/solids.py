@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .report import Limit
 
 if TYPE_CHECKING:
-    from ..constraints.boundary import BoxBoundary
+    from ..constraints.boundary import BoxBoundary, SphereBoundary
     from ..constraints.constraint import Constraint
     from ..constraints.contact import Contact
     from .probe import Probe
@@ -41,23 +42,45 @@ def contact_limits(part: Contact, probe: Probe) -> list[Limit]:
 
 def box_limits(part: BoxBoundary, probe: Probe) -> list[Limit]:
     """No particle may cross the box in a substep: |v| dt <= upper - lower, along each axis."""
-    tightest: Limit | None = None
+
+    names = [f"width / v along {axis}" for axis in "xyz"]
+    return _crossing(part, probe, names, lambda box, v: (box.upper - box.lower) / np.abs(v))
+
+
+def sphere_limits(part: SphereBoundary, probe: Probe) -> list[Limit]:
+    """No particle may pass the middle of an obstacle, or cross a container: |v| dt <= radius."""
+
+    return _crossing(
+        part, probe, ["radius / v"],
+        lambda ball, v: ball.radius / np.linalg.norm(v, axis=1, keepdims=True),
+    )  # fmt: skip
+
+
+def _crossing(
+    part: Any, probe: Probe, names: list[str], times: Callable[[Any, np.ndarray], np.ndarray]
+) -> list[Limit]:
+    """The shortest time that any particle takes, at its velocity against the boundary's.
+
+    Args:
+        part: The boundary of all worlds.
+        probe: What asks.
+        names: What the k times of a particle are.
+        times: Of one world's boundary and velocities (m, 3): the times, (m, k).
+    """
+    found = []
     members = part.held.particle.numpy()
     for w, peer in enumerate(part.peers):
         rows = members[probe.model.world_of[members] == w]
-        with np.errstate(divide="ignore"):
-            dt = (peer.upper - peer.lower) / np.abs(probe.velocity[rows])
-        if not np.isfinite(dt).any():
-            continue
-        k, axis = (int(each) for each in np.unravel_index(np.argmin(dt), dt.shape))
-        if tightest is None or dt[k, axis] < tightest.dt:
-            reason = (
-                f"width / v along {'xyz'[axis]}, {peer.upper[axis] - peer.lower[axis]:.4g} / "
-                f"{abs(probe.velocity[rows[k], axis]):.4g}"
-            )
-            place = probe.place(int(rows[k]))
-            tightest = Limit(part.name, "speed", float(dt[k, axis]), reason, *place)
-    return [] if tightest is None else [tightest]
+        if len(rows):
+            v = probe.velocity[rows] - peer.velocity
+            with np.errstate(divide="ignore"):
+                dt = times(peer, v)
+            k, which = (int(each) for each in np.unravel_index(np.argmin(dt), dt.shape))
+            if np.isfinite(dt[k, which]):
+                reason = f"{names[which]}, v = {np.linalg.norm(v[k]):.4g}"
+                place = probe.place(int(rows[k]))
+                found.append(Limit(part.name, "speed", float(dt[k, which]), reason, *place))
+    return [min(found, key=lambda limit: limit.dt)] if found else []
 
 
 def constraint_limits(part: Constraint, probe: Probe) -> list[Limit]:

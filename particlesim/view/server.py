@@ -43,6 +43,7 @@ PAGE = {
     "/film.js": ("film.js", "text/javascript"),
     "/camera.js": ("camera.js", "text/javascript"),
     "/painter.js": ("painter.js", "text/javascript"),
+    "/gl.js": ("gl.js", "text/javascript"),
     "/shaders.js": ("shaders.js", "text/javascript"),
 }
 HEADERS = {

@@ -298,6 +298,16 @@ def test_a_fast_impact_is_stopped_or_announced(device):
         sim.run(1)
 
 
+def test_a_ball_that_would_skip_an_obstacle_is_announced(device):
+    scene = ps.Scene()
+    scene.add_particles([(-1, 0.01, 0)], velocity=(300, 0, 0), radius=0.01)
+    scene.add_constraint(ps.SphereBoundary((0, 0, 0), 0.2, inside=False))
+    sim = ps.Simulation(scene, ps.Settings(dt=1 / 60, substeps=10), device=device)
+    assert sim.stability().dt == pytest.approx(0.2 / 300)
+    with pytest.warns(ps.StabilityWarning, match="SphereBoundary"):
+        sim.run(1)
+
+
 def test_a_dense_seeding_expands_without_a_blast(device):
     # Water seeded at 1.26 of its spacing: twice the density. Tait's energy of that compression is
     # all that there is to gain.

@@ -1,16 +1,15 @@
 // Draws packets: spheres, tubes, triangles, lines and the ground into a texture with its depths,
 // and that onto the screen.
 
+import { PLACES, program, sheet, table } from "./gl.js";
 import { SOURCES } from "./shaders.js";
 
-const PLACES = ["position", "radius", "color", "position2", "radius2", "color2", "normal"];
 const SIDES = 14; // of a tube
 const CLEAR = 0.22; // opacity of boundaries that are to be clear
 const PLANE = 0.4; // of planes, which would hide what is below them
 const KEY = [-0.6, 1.2, 0.8]; // to the light: right, up, towards the camera, level
 const EDGE = [0.2, 0.26, 0.33, 0.8];
 const GRID = 30; // steps from the middle to the end
-const WIDE = 1024; // texels a row, of the textures that spheres come from
 const RING = 5; // pixels to the wider ring of the shading
 
 const unit = (a) => a.map((x) => x / Math.hypot(...a));
@@ -23,8 +22,8 @@ export class Painter {
     if (!gl) throw new Error("this browser has no WebGL 2; try another, or allow it its graphics card");
     this.gl = gl;
     this.programs = {};
-    for (const [name, [vertex, fragment]] of Object.entries(SOURCES)) {
-      this.programs[name] = this.program(name, vertex, fragment);
+    for (const [name, sources] of Object.entries(SOURCES)) {
+      this.programs[name] = program(gl, name, sources);
     }
     this.layers = { still: new Map(), frame: new Map() };
     this.target = null;
@@ -36,39 +35,23 @@ export class Painter {
     const before = this.layers[layer];
     const now = new Map();
     for (const [name, array] of Object.entries(packet.arrays)) {
-      const { buffer = gl.createBuffer(), table } = before.get(name) ?? {};
+      const old = before.get(name) ?? {};
+      const own = { ...array };
+      // Spheres come from textures; tubes have both, since spheres close them.
+      if (/\.(ball|cone|wire)/.test(name)) own.table = table(gl, array, old.table);
+      if (!/\.ball/.test(name)) {
+        own.buffer = old.buffer ?? gl.createBuffer();
+        gl.bindBuffer(gl.ARRAY_BUFFER, own.buffer);
+        gl.bufferData(gl.ARRAY_BUFFER, array.values, gl.DYNAMIC_DRAW);
+      }
       before.delete(name);
-      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-      gl.bufferData(gl.ARRAY_BUFFER, array.values, gl.DYNAMIC_DRAW);
-      now.set(name, { ...array, buffer, table: this.table(name, array, table) });
+      now.set(name, own);
     }
-    for (const { buffer, table } of before.values()) {
-      gl.deleteBuffer(buffer);
-      gl.deleteTexture(table);
+    for (const old of before.values()) {
+      gl.deleteBuffer(old.buffer ?? null);
+      gl.deleteTexture(old.table ?? null);
     }
     this.layers[layer] = now;
-  }
-
-  // A texture with a texel for each row of what is drawn as spheres; old: one to use again.
-  table(name, { values, width, count, type }, old) {
-    if (!/\.(ball|cone|wire)(_color)?$/.test(name)) return undefined;
-    const gl = this.gl;
-    const made = old ?? gl.createTexture();
-    const [inside, format] = {
-      uint8: [gl.RGBA8, gl.RGBA], float32: width === 3 ? [gl.RGB32F, gl.RGB] : [gl.RGBA32F, gl.RGBA],
-    }[type];
-    const kind = type === "uint8" ? gl.UNSIGNED_BYTE : gl.FLOAT;
-    const full = Math.floor(count / WIDE);
-    gl.bindTexture(gl.TEXTURE_2D, made);
-    gl.texImage2D(gl.TEXTURE_2D, 0, inside, WIDE, Math.ceil(count / WIDE), 0, format, kind, null);
-    if (full) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDE, full, format, kind, values);
-    const rest = values.subarray(full * WIDE * width);
-    if (rest.length) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, full, count % WIDE, 1, format, kind, rest);
-    for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
-      gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
-    }
-    gl.bindTexture(gl.TEXTURE_2D, null);
-    return made;
   }
 
   // look: camera, box, up, floor (null: no grid), boundaries ("solid", "clear", "edges", "none"),
@@ -76,7 +59,7 @@ export class Painter {
   draw(look) {
     const gl = this.gl;
     const { width, height } = this.canvas;
-    this.resize(width * look.samples, height * look.samples);
+    this.target = sheet(gl, width * look.samples, height * look.samples, this.target);
     this.view = this.uniforms(look, width / height, height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.target.frame);
     gl.viewport(0, 0, this.target.width, this.target.height);
@@ -279,66 +262,5 @@ export class Painter {
     for (let at = 0; at < PLACES.length; at++) gl.disableVertexAttribArray(at);
     const values = { ...this.view, ...own };
     for (const [uniform, { place, set }] of Object.entries(places)) set(place, values[uniform]);
-  }
-
-  program(name, vertex, fragment) {
-    const gl = this.gl;
-    const program = gl.createProgram();
-    for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
-      const shader = gl.createShader(kind);
-      gl.shaderSource(shader, source);
-      gl.compileShader(shader);
-      gl.attachShader(program, shader);
-      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) {
-        throw new Error(`shader ${name}: ${gl.getShaderInfoLog(shader)}`);
-      }
-    }
-    PLACES.forEach((place, at) => gl.bindAttribLocation(program, at, place));
-    gl.linkProgram(program);
-    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
-      throw new Error(`shader ${name}: ${gl.getProgramInfoLog(program)}`);
-    }
-    const setters = {
-      [gl.FLOAT]: (p, x) => gl.uniform1f(p, x),
-      [gl.FLOAT_VEC2]: (p, x) => gl.uniform2fv(p, x),
-      [gl.FLOAT_VEC3]: (p, x) => gl.uniform3fv(p, x),
-      [gl.FLOAT_VEC4]: (p, x) => gl.uniform4fv(p, x),
-      [gl.FLOAT_MAT3]: (p, x) => gl.uniformMatrix3fv(p, false, x),
-      [gl.INT]: (p, x) => gl.uniform1i(p, x),
-      [gl.BOOL]: (p, x) => gl.uniform1i(p, x),
-      [gl.SAMPLER_2D]: (p, x) => gl.uniform1i(p, x),
-    };
-    const places = {};
-    for (let k = 0; k < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); k++) {
-      const { name: uniform, type } = gl.getActiveUniform(program, k);
-      places[uniform] = { place: gl.getUniformLocation(program, uniform), set: setters[type] };
-    }
-    return { program, places };
-  }
-
-  // The texture that is drawn into, of this size.
-  resize(width, height) {
-    const gl = this.gl;
-    if (this.target?.width === width && this.target?.height === height) return;
-    if (this.target) {
-      gl.deleteTexture(this.target.color);
-      gl.deleteTexture(this.target.depth);
-      gl.deleteFramebuffer(this.target.frame);
-    }
-    const texture = (format) => {
-      const made = gl.createTexture();
-      gl.bindTexture(gl.TEXTURE_2D, made);
-      gl.texStorage2D(gl.TEXTURE_2D, 1, format, width, height);
-      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
-      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
-      gl.bindTexture(gl.TEXTURE_2D, null);
-      return made;
-    };
-    const frame = gl.createFramebuffer();
-    const [color, depth] = [texture(gl.RGBA8), texture(gl.DEPTH32F_STENCIL8)];
-    gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, color, 0);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_STENCIL_ATTACHMENT, gl.TEXTURE_2D, depth, 0);
-    this.target = { frame, color, depth, width, height };
   }
 }
