@@ -93,9 +93,7 @@ class Settings:
             "safety": validate.number(owner, "safety", self.safety, above=0.0, maximum=1.0),
             "iterations": validate.whole(owner, "iterations", self.iterations, minimum=1),
             "retries": validate.whole(owner, "retries", self.retries, minimum=1),
-            "energy_growth": validate.number(
-                owner, "energy_growth", self.energy_growth, above=1.0
-            ),
+            "energy_growth": validate.number(owner, "energy_growth", self.energy_growth, above=1.0),
             "relaxation": validate.number(
                 owner, "relaxation", self.relaxation, above=0.0, maximum=1.0
             ),
