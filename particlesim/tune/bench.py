@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from ..tradeoff.sweep import choose_judge, measure
 from .report import Trial, finite
 
 SEED = "seed"  # the option of build that makes another of the same kind
-WEIGHED, WEIGHINGS = 4, 5  # frames of a run that is only weighed, and how often
 
 
 class Bench:
@@ -77,13 +75,7 @@ class Bench:
             cause=next((run.cause for run in runs if run.cause), ""),
         )
 
-    def weigh(self, chosen: Sequence[Mapping[str, Any]]) -> list[float]:
-        """Costs of few frames of each, the least of several in turn."""
-        return self.costs(chosen, WEIGHINGS, frames=WEIGHED)
-
-    def costs(
-        self, chosen: Sequence[Mapping[str, Any]], repeats: int, frames: int | None = None
-    ) -> list[float]:
+    def costs(self, chosen: Sequence[Mapping[str, Any]], repeats: int) -> list[float]:
         """Wall seconds per simulated second, measured in turn; the least, as disturbance adds.
 
         Infinite where it fails.
@@ -92,7 +84,6 @@ class Bench:
         runs = []
         for values in chosen:
             plan = study.plan(values)
-            plan = replace(plan, frames=plan.frames if frames is None else frames)
             runs.append(Run(plan, study.simulation(plan)))
         measure(runs, Judge(), repeats, None)
         return [min(run.costs) if run.costs and not run.cause else math.inf for run in runs]

@@ -14,6 +14,7 @@ BETTER = 0.95  # of the cost of the best: below it another setting counts as che
 FLOOR = 0.8  # of the error at a quarter of the substeps; what falls less has reached its floor
 STRIDE = 4.0  # largest jump in substeps, up or down
 RESOLUTION = 1.1  # between substeps that are told apart
+WEIGHINGS = 3  # runs of each that its weight is the least of
 
 
 class Search:
@@ -93,7 +94,7 @@ class Search:
         if len(modes) == 1:
             return
         substeps = self.levels[level]
-        costs = self.bench.weigh([{**mode, "substeps": substeps} for mode in modes])
+        costs = self.bench.costs([{**mode, "substeps": substeps} for mode in modes], WEIGHINGS)
         for (name, value), cost in zip(names[1:], costs[1:], strict=True):
             self.weights[name, repr(value)] = cost / costs[0]
 
