@@ -162,7 +162,7 @@ def test_a_reference_that_does_not_settle_says_so():
 
 def test_it_finds_the_better_integrator():
     found = tuned(1e-4)
-    assert found.error <= 1e-4 and found.cost > 0 and found.seeds == 2
+    assert found.error <= 1e-4 and found.cost > 0 and found.seeds == 3
     assert found.settings.integrator == "velocity_verlet"
     # Leapfrog's phase is off by omega^3 h^2 t / 24: h = 0.0036 for 0.2 * phase = 1e-4 at t = 0.4,
     # so 28 substeps; ten per cent of margin and of a level more, and sin(4) is 0.76.
@@ -180,7 +180,7 @@ def test_the_line_can_be_pasted():
 
 
 def test_other_seeds_meet_it_too():
-    found = tuned(1e-3, seeds=3)
+    found = tuned(1e-3)
     for seed in range(10):
         sim = ps.Simulation(oscillator(seed), found.settings, device="cpu")
         for _ in range(4):

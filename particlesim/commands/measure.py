@@ -75,7 +75,7 @@ def tune(
     ] = None,
     options: Options = None,
     frames: Frames = None,
-    seeds: Annotated[int, typer.Option(min=1, help="Seeds to try everything with.")] = 2,
+    seeds: Annotated[int, typer.Option(min=1, help="Seeds to try everything with.")] = 3,
     device: Device = None,
     debug: Debug = False,
 ) -> None:

@@ -66,13 +66,15 @@ class Bench:
         # All do the same work; what disturbs only slows.
         cost = min((min(run.costs) for run in runs if run.costs), default=math.inf)
         plan = runs[0].plan
+        errors = [math.inf if run.cause else finite(run.error) for run in runs]
         return Trial(
             values=dict(values),
             settings=plan.settings,
             options={name: value for name, value in plan.options.items() if name != SEED},
-            error=max(math.inf if run.cause else finite(run.error) for run in runs),
+            error=max(errors),
             cost=cost,
             cause=next((run.cause for run in runs if run.cause), ""),
+            spread=max(errors) - min(errors) if math.isfinite(max(errors)) else 0.0,
         )
 
     def costs(self, chosen: Sequence[Mapping[str, Any]], repeats: int) -> list[float]:

@@ -22,6 +22,7 @@ class Trial:
         error: The largest of all seeds; infinite if one of them failed.
         cost: Wall seconds per simulated second.
         cause: Why it failed, if it did.
+        spread: By how much the errors of the seeds differ.
     """
 
     values: dict[str, Any]
@@ -30,6 +31,12 @@ class Trial:
     error: float
     cost: float
     cause: str = ""
+    spread: float = 0.0
+
+    @property
+    def bound(self) -> float:
+        """What the error of yet another seed may be: as far again as those tried differ."""
+        return self.error + self.spread
 
     def __str__(self) -> str:
         knobs = ", ".join(

@@ -18,7 +18,7 @@ WEIGHINGS = 3  # runs of each that its weight is the least of
 
 
 class Search:
-    """The cheapest trial whose error is at most ``target``.
+    """The cheapest trial whose error, that of another seed too, is at most ``target``.
 
     Error falls with substeps, and cost is proportional to them: so the least substeps that suffice
     are found by the secant of the logarithms, and of another mode (integrator, precision,
@@ -72,7 +72,7 @@ class Search:
         for integrator in self.ladders.get("integrator", ()):
             mode = {**self.mode, "integrator": integrator}
             trial = self.bench.trial({**mode, "substeps": self.levels[level]})
-            excess = max(trial.error / self.target, 1e-6)
+            excess = max(trial.bound / self.target, 1e-6)
             prices[integrator] = self.price(trial.values) * excess ** (1.0 / self._order(mode, {}))
         if not prices:
             return self.mode
@@ -120,7 +120,7 @@ class Search:
         low, high, at = -1, highest + 1, start
         seen: dict[int, float] = {}
         while low + 1 < high:
-            seen[at] = self.bench.trial({**mode, "substeps": self.levels[at]}).error
+            seen[at] = self.bench.trial({**mode, "substeps": self.levels[at]}).bound
             if self._suffices(mode, at):
                 high = at
             elif self._stuck(seen, at):
@@ -171,7 +171,7 @@ class Search:
     def _suffices(self, mode: Mapping[str, Any], level: int) -> bool:
         """Whether the error is small enough; it is kept if that makes it the best."""
         trial = self.bench.trial({**mode, "substeps": self.levels[level]})
-        if trial.error > self.target:
+        if trial.bound > self.target:
             return False
         if self.best is None or self.price(trial.values) < self.price(self.best.values):
             self.best = trial

@@ -33,7 +33,7 @@ def tune(
     vary: Mapping[str, Iterable[Any]] | None = None,
     reference: Any = None,
     margin: float = 0.9,
-    seeds: int = 2,
+    seeds: int = 3,
     repeats: int = 3,
     frames: int | None = None,
     settings: Settings | None = None,
@@ -46,7 +46,8 @@ def tune(
     Substeps are sought between the stability limit (``Simulation.stability``) and where more stop
     to help; integrator, precision, iterations, skin and compensation, and whatever ``vary`` names,
     are changed one by one as long as that makes it cheaper. So that other seeds of the scene meet
-    the tolerance too, the error of every one tried counts, and must be within ``margin`` of it.
+    the tolerance too, the largest error of those tried, and as much as they differ on top of it,
+    must be within ``margin`` of it.
 
     Args:
         build: ``build(**options) -> Scene``; ``settings``, ``frames`` and ``error`` of its module
@@ -106,7 +107,7 @@ def tune(
     search = Search(bench, margin * tolerance, ladders, substeps)
     search.run(first.settings.substeps)
     if search.best is None:
-        least = min((each.error for each in bench.trials), default=math.inf)
+        least = min((each.bound for each in bench.trials), default=math.inf)
         raise validate.fail(
             OWNER, "error", f"be at least {least / margin:.3g}, the smallest found over margin",
             tolerance, "allow more, or vary what the error depends on",
@@ -192,7 +193,7 @@ def _polished(
         if k == 0 or costs[k] > BETTER * costs[0]:
             break
         trial = bench.trial(rivals[k])
-        if trial.error <= target:
+        if trial.bound <= target:
             return dataclasses.replace(trial, cost=costs[k])
     return dataclasses.replace(best, cost=costs[0])
 
