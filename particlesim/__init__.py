@@ -12,7 +12,6 @@ from .constraints import (
 )
 from .errors import SimulationError, SimulationWarning
 from .history import History, read_history
-from .incident import Incident
 from .interactions import (
     SPH,
     ArtificialViscosity,
@@ -31,7 +30,6 @@ from .interactions import (
 )
 from .law import Law, law
 from .ledger import Ledger
-from .record import UsdRecorder
 from .render import Camera
 from .scene import Group, Scene
 from .settings import Settings
@@ -41,6 +39,8 @@ from .stress import Stress, stress
 from .surface import Surface
 from .tradeoff import Tradeoff, tradeoff
 from .tune import Tuned, tune
+from .usd import UsdRecorder
+from .watchdog.incident import Incident
 
 __version__ = "0.1.0"
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import validate
-from .accounts import motion
+from .ledger.accounts import motion
 
 if TYPE_CHECKING:
     from .simulation import Simulation

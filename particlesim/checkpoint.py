@@ -22,9 +22,9 @@ import numpy as np
 
 from . import batch, files, validate
 from .fingerprint import difference, fingerprint
-from .incident import Incident
 from .scene import Scene
 from .settings import Settings
+from .watchdog.incident import Incident
 
 if TYPE_CHECKING:
     import warp as wp

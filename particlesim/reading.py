@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from . import checkpoint, ledger
+from . import checkpoint
 from .access import Access
 from .diagnostics import Diagnostics, measure
 from .explain import Explanation, explain
-from .ledger import Ledger
+from .ledger.ledger import Ledger, read
 from .render import Camera, Image
 from .stability import Stability, stability
 from .world import World
@@ -85,7 +85,7 @@ class Reading(Access):
             height: In pixels.
             camera: None: one that sees all.
             color: Name of a value to colour particles by, as ``color_by`` of
-                :class:`~particlesim.record.UsdRecorder`; None: each group has its own colour.
+                :class:`~particlesim.usd.recorder.UsdRecorder`; None: each group has its own colour.
             **options: ``color_map``, ``color_range``, ``worlds``, ``groups``, ``layout`` and
                 ``surface`` as of UsdRecorder, but worlds stand side by side; ``ground``: True,
                 False or a height [length], None: where there are boundaries; ``background``
@@ -121,7 +121,7 @@ class Reading(Access):
         Raises:
             ValueError: ``settings.ledger`` is not set.
         """
-        return ledger.read(self._sim)
+        return read(self._sim)
 
     def explain(self) -> Explanation:
         """What is allocated, compiled and launched, and why."""

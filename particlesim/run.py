@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from . import validate
 from .errors import SimulationError
-from .history import History, check_output
+from .history.writer import History, check_output
 from .progress import Meter
 from .recorders import BackgroundWriter, Recorder, open_recorder
 from .resume import OWNER, Checkpoints

@@ -10,14 +10,13 @@ from typing import Any, Self
 import warp as wp
 
 from . import batch, checkpoint, validate
-from .accounts import Accounts
 from .assign import assign_rows, reset_worlds
 from .executors import Executor
 from .frames import Frames, evaluate_forces
-from .incident import Incident
 from .integrators import METHODS
 from .interactions.fusion import fuse
 from .launch import owner
+from .ledger.accounts import Accounts
 from .model import Model
 from .neighbors import Neighbors
 from .observers import FINISH, FORCE, PROJECT, Observers
@@ -27,7 +26,8 @@ from .settings import Settings
 from .snapshot import Snapshot
 from .stability import automatic, warn_if_past
 from .state import State
-from .watchdog import Watchdog
+from .watchdog.incident import Incident
+from .watchdog.watch import Watchdog
 
 
 class Simulation(Reading):
@@ -189,7 +189,7 @@ class Simulation(Reading):
             fields: Names of further per-particle arrays to record.
             progress: True for a bar on the terminal, or a function of (frame, frames).
             history: Path of a ``.csv`` or ``.jsonl`` file to write energies, momenta and errors of
-                the start and every frame to (see :class:`~particlesim.history.History`).
+                the start and every frame to (see :class:`~particlesim.history.writer.History`).
             checkpoint: Frames from one checkpoint to the next; 0: none. None: by the clock, at
                 less than 2 % of the time.
             resume: Go on with the run that recorded to ``record``; where there is none, start it.

@@ -15,7 +15,7 @@ import warp as wp
 import particlesim as ps
 from particlesim import kernels, launch
 from particlesim.frames import record_frame
-from particlesim.history_sample import sample
+from particlesim.history.sample import sample
 from particlesim.kernels.precision import KERNELS
 from particlesim.launch import Launch, Program
 from particlesim.model import Model

@@ -12,7 +12,7 @@ from pxr import Sdf, Usd
 
 import particlesim as ps
 from particlesim import checkpoint, resume
-from particlesim.history import read_history
+from particlesim.history.writer import read_history
 
 FORMATS = [".usda", ".usdc", ".npz", ".ply", ".gsd", ".vtkhdf"]
 NEEDS = {".gsd": "gsd", ".vtkhdf": "h5py"}

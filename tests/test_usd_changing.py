@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
-from particlesim.usd import UsdWriter
-from particlesim.usd_geometry import vertex_normals
-from particlesim.usd_info import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
-from particlesim.usd_shapes import Shape as SameShape
+from particlesim.usd.geometry import vertex_normals
+from particlesim.usd.info import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
+from particlesim.usd.shapes import Shape as SameShape
+from particlesim.usd.writer import UsdWriter
 from particlesim.usd_tools import check
 
 BLUE, RED = (0.2, 0.5, 0.9), (0.9, 0.2, 0.1)

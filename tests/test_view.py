@@ -19,7 +19,7 @@ from pxr import Gf, Usd, UsdGeom
 
 import particlesim as ps
 from particlesim import cli, colors
-from particlesim.record import UsdRecorder
+from particlesim.usd.recorder import UsdRecorder
 from particlesim.view import Server
 from particlesim.view.footage import Footage
 from particlesim.view.live import Live

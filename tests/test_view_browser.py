@@ -9,7 +9,7 @@ import pytest
 from pxr import Gf, Usd, UsdGeom, Vt
 
 import particlesim as ps
-from particlesim.record import UsdRecorder
+from particlesim.usd.recorder import UsdRecorder
 from particlesim.view import Server
 from particlesim.view.footage import Footage
 from particlesim.view.live import Live

@@ -9,9 +9,10 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from particlesim import audit, verlet
+from particlesim import verlet
 from particlesim.resume import checkpoint_path
-from particlesim.watchdog import Watchdog
+from particlesim.watchdog import audit
+from particlesim.watchdog.watch import Watchdog
 
 G = 9.81
 

@@ -144,7 +144,7 @@ def plot(
 ) -> None:
     """Draw what a run recorded over time."""
     with one_line_errors(Meter(), debug):
-        from ..plots import plot_history
+        from ..history.plots import plot_history
 
         picture = file.with_suffix(".png") if out is None else out
         names = [word.strip() for word in what.split(",")] if what else None

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import validate
-from ..record import UsdRecorder
+from ..usd.recorder import UsdRecorder
 from .background import BackgroundWriter
 from .base import ParticleFrame, ParticleRecorder, Recorder
 from .gsd import GsdRecorder
@@ -47,7 +47,7 @@ def open_recorder(sim: Simulation, path: str | os.PathLike[str], **options: Any)
 
     Args:
         sim: The simulation.
-        path: ``.usda``, ``.usd`` or ``.usdc`` (:class:`~particlesim.record.UsdRecorder`);
+        path: ``.usda``, ``.usd`` or ``.usdc`` (:class:`~particlesim.usd.recorder.UsdRecorder`);
             ``.npz``, ``.ply``, ``.gsd`` or ``.vtkhdf``
             (:class:`~particlesim.recorders.base.ParticleRecorder`).
         **options: Further arguments of the recorder.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 import numpy as np
 
 from .. import validate
-from ..usd_fields import ParticleFields
+from ..usd.fields import ParticleFields
 
 if TYPE_CHECKING:
     from ..simulation import Simulation

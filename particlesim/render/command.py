@@ -103,7 +103,7 @@ def render(name: str, request: Request, meter: Meter, simulate: Callable[[], Any
 
 def _recorded(sim: Any, request: Request, path: Path) -> Path:
     """One frame of a scene, as a file."""
-    from ..record import UsdRecorder
+    from ..usd.recorder import UsdRecorder
 
     sim.run(frames=request.frame or 0)
     fields = [request.color] if request.color else []

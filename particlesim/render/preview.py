@@ -85,9 +85,9 @@ def seen(sim: Simulation, **recorded: Any) -> View:
 
     Args:
         sim: The simulation.
-        **recorded: Options of :class:`~particlesim.record.UsdRecorder`.
+        **recorded: Options of :class:`~particlesim.usd.recorder.UsdRecorder`.
     """
-    from ..record import UsdRecorder
+    from ..usd.recorder import UsdRecorder
     from ..usd_tools.recording import Recording
     from .stage import View, look_at
 

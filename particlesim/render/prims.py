@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pxr import Usd, UsdGeom
 
-from ..usd_geometry import CORNERS, FACES
+from ..usd.geometry import CORNERS, FACES
 from .geometry import Geometry
 from .paint import Paint, authored
 

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..record import UsdRecorder
-from ..usd import UsdWriter
+from ..usd.recorder import UsdRecorder
+from ..usd.writer import UsdWriter
 from .footage import Footage
 
 if TYPE_CHECKING:

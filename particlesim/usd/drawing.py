@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import validate
-from .interactions.sph import SPH
-from .model import select
-from .scene import Group
-from .usd_info import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
-from .usd_placement import closed, offsets, periodic_box
+from .. import validate
+from ..interactions.sph import SPH
+from ..model import select
+from ..scene import Group
+from .info import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
+from .placement import closed, offsets, periodic_box
 
 if TYPE_CHECKING:
-    from .scene import Scene
-    from .simulation import Simulation
-    from .surface import Mesh, Surface
+    from ..scene import Scene
+    from ..simulation import Simulation
+    from ..surface.surface import Mesh, Surface
 
 OWNER = "UsdRecorder"
 PLAYBACK_FPS = 24.0  # where a frame is not a sensible part of a second
@@ -64,7 +64,7 @@ class Drawing:
         layout: None, ``"grid"``, or (3,) [length] from one world to the next.
         instancer: Spheres of a PointInstancer instead of Points.
         surface: Draw the members of each SPH as one surface instead; options of
-            :class:`~particlesim.surface.Surface`, or True for none.
+            :class:`~particlesim.surface.surface.Surface`, or True for none.
     """
 
     def __init__(
@@ -157,7 +157,7 @@ class Drawing:
         yield from (fluid.prim for fluid in self.fluids)
 
     def _fluids(self, options: dict[str, Any]) -> Iterator[Fluid]:
-        from .surface import Surface
+        from ..surface.surface import Surface
 
         parts = [part for part in self.sim.interactions if isinstance(part, SPH)]
         if not parts:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from .diagnostics import measure
-from .interactions.sph import SPH
+from ..diagnostics import measure
+from ..interactions.sph import SPH
 from .residuals import residuals
 
 if TYPE_CHECKING:
-    from .simulation import Simulation
+    from ..simulation import Simulation
 
 
 def sample(sim: Simulation) -> dict[str, np.ndarray]:

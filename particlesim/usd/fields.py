@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import colors, validate
-from .interactions.sph import SPH
+from .. import colors, validate
+from ..interactions.sph import SPH
 
 if TYPE_CHECKING:
-    from .simulation import Simulation
+    from ..simulation import Simulation
 
 OWNER = "UsdRecorder"
 DERIVED = ("speed",)

@@ -9,9 +9,9 @@ import numpy as np
 from pxr import Gf
 
 if TYPE_CHECKING:
-    from .usd_frame import Frame
-    from .usd_info import StageInfo
-    from .usd_shapes import Shape
+    from .frame import Frame
+    from .info import StageInfo
+    from .shapes import Shape
 
 FOCAL_LENGTH = 35.0
 APERTURE = np.array([36.0, 20.25])  # 16:9, in the units of the focal length

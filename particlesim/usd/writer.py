@@ -5,9 +5,9 @@
 temporary name and ``os.replace``, so that whatever kills the process, finished frames can be read.
 Memory does not grow with the number of frames.
 
-What is recorded is described on the host (:mod:`particlesim.usd_info`), so that any source of
-arrays can be recorded (:mod:`particlesim.record` does it for simulations). How the root looks
-inside is :mod:`particlesim.usd_stage`, what clips hold :mod:`particlesim.usd_clips`.
+What is recorded is described on the host (:mod:`particlesim.usd.info`), so that any source of
+arrays can be recorded (:mod:`particlesim.usd.recorder` does it for simulations). How the root looks
+inside is :mod:`particlesim.usd.stage`, what clips hold :mod:`particlesim.usd.clips`.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ from typing import Any, Self
 
 from pxr import Sdf, Tf
 
-from . import files, usd_clips, usd_stage, validate
-from .usd_frame import Frame, FrameChecker, field_kinds
-from .usd_info import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
-from .usd_resume import take_up
+from .. import files, validate
+from . import clips, stage
+from .frame import Frame, FrameChecker, field_kinds
+from .info import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
+from .resume import take_up
 
 SUFFIXES = (".usda", ".usd", ".usdc")
 
@@ -53,7 +54,7 @@ class UsdWriter:
             recording to be resumed that is of something else.
 
     Example:
-        >>> from particlesim.usd_info import PointsPrim
+        >>> from particlesim.usd import PointsPrim
         >>> drops = PointsPrim(0, "drops", slice(0, 2), np.arange(2), 0.1, (0.2, 0.5, 0.9))
         >>> with UsdWriter("drops.usda", StageInfo(points=[drops], frames=2, fps=24)) as writer:
         ...     for frame in range(2):
@@ -84,7 +85,7 @@ class UsdWriter:
         self.fields = field_kinds(fields or {})
         self.overwrite = overwrite or resume is not None
         self._refuse_unusable()
-        self._layout = usd_clips.layout(info)
+        self._layout = clips.layout(info)
         self._checker = FrameChecker(info, self._layout.points, self.fields)
         self._root: Sdf.Layer | None = None
         self._clip: Sdf.Layer | None = None
@@ -145,7 +146,7 @@ class UsdWriter:
         if frame > self._planned_end:
             # Twice as far, so that long unplanned runs rewrite the root a few times only.
             self._publish_root(2 * frame)
-        usd_clips.fill_clip(self._clip, self._layout, self.info, checked)
+        clips.fill_clip(self._clip, self._layout, self.info, checked)
         _publish(self._clip, self.clips / f"f.{frame:06d}.usdc")
         self._frame = frame
 
@@ -206,11 +207,11 @@ class UsdWriter:
         for stale in [*self.clips.glob("f.*.usdc"), *self.clips.glob("manifest.*usda")]:
             stale.unlink()
         clouds = [frame.x[rows] for rows, _ in frame.clouds]
-        self.info = usd_stage.sized(self.info, clouds)
-        manifest = usd_clips.manifest(self._layout, self.fields, self.info)
+        self.info = stage.sized(self.info, clouds)
+        manifest = clips.manifest(self._layout, self.fields, self.info)
         _publish(manifest, self.clips / "manifest.usda")
         self.first = frame.number
-        self._root = usd_stage.author_root(self._layout, self.info, self.fields, frame)
+        self._root = stage.author_root(self._layout, self.info, self.fields, frame)
         self._publish_root(frame.number + self.info.frames - 1)
         self._clip = _mould(manifest)
 
@@ -225,7 +226,7 @@ class UsdWriter:
             self._publish_root(planned)
 
     def _publish_root(self, end: int) -> None:
-        usd_stage.set_frames(self._root, self.clips.name, self.first, end)
+        stage.set_frames(self._root, self.clips.name, self.first, end)
         _publish(self._root, self.path)
         self._planned_end = end
 

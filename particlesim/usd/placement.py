@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import validate
+from .. import validate
 
 if TYPE_CHECKING:
-    from .scene import Scene
-    from .simulation import Simulation
+    from ..scene import Scene
+    from ..simulation import Simulation
 
 GRID_GAP = 0.2  # between worlds, in parts of the largest
 

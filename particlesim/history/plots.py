@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from . import files, validate
-from .history import Record, read_history
+from .. import files, validate
+from .writer import Record, read_history
 
 FORMATS = (".png", ".svg", ".pdf")
 LABELLED = 8  # curves of a panel that are named in its legend
@@ -86,7 +86,7 @@ def plot_history(
     """Draw a history: a panel each for what is asked for, worlds as lines.
 
     Args:
-        history: The file, or what :func:`particlesim.history.read_history` made of it.
+        history: The file, or what :func:`particlesim.history.writer.read_history` made of it.
         path: The picture, ``.png``, ``.svg`` or ``.pdf``.
         what: Of ``"energy"``, ``"drift"``, ``"momentum"``, ``"angular_momentum"``,
             ``"potential"``, ``"density"``, ``"residual"``; None: all that the history has.

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from . import validate
-from .usd_shapes import Color, Shape, named, replace
+from .. import validate
+from .shapes import Color, Shape, named, replace
 
 __all__ = ["Color", "LinksPrim", "MeshPrim", "PointsPrim", "Shape", "StageInfo"]
 

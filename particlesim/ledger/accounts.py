@@ -30,16 +30,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from .diagnostics import blocks
-from .kernels.copy import copy_kernel, zero_kernel
-from .kernels.ledger import TOTALS, account_kernel, change_kernel
-from .launch import launch, owner
-from .observers import FORCE, PROJECT, Observer
+from ..diagnostics import blocks
+from ..kernels.copy import copy_kernel, zero_kernel
+from ..kernels.ledger import TOTALS, account_kernel, change_kernel
+from ..launch import launch, owner
+from ..observers import FORCE, PROJECT, Observer
 
 if TYPE_CHECKING:
-    from .model import Model
-    from .simulation import Simulation
-    from .state import State
+    from ..model import Model
+    from ..simulation import Simulation
+    from ..state import State
 
 BLOCK_CPU, BLOCK_CUDA = 256, 16  # particles that a thread sums
 

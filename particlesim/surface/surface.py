@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import validate
-from .executors import available_threads
-from .interactions import SPH
+from .. import validate
+from ..executors import available_threads
+from ..interactions import SPH
+from ..model import select
+from ..scene import Group, Scene
 from .marching import Marching, Shape
-from .model import select
-from .scene import Group, Scene
 from .splashsurf import Splashsurf
 
 if TYPE_CHECKING:
-    from .simulation import Simulation
+    from ..simulation import Simulation
 
 Mesh = tuple[np.ndarray, np.ndarray, np.ndarray]
 METHODS = ("marching_cubes", "splashsurf")

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from . import validate
-from .usd import UsdWriter
-from .usd_drawing import Drawing
-from .usd_fields import ParticleColors, ParticleFields
+from .. import validate
+from .drawing import Drawing
+from .fields import ParticleColors, ParticleFields
+from .writer import UsdWriter
 
 if TYPE_CHECKING:
-    from .simulation import Simulation
+    from ..simulation import Simulation
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class UsdRecorder:
         instancer: Draw groups as a PointInstancer of spheres. Files are larger, and Blender shows
             no colours of instances.
         surface: Draw the fluid of each SPH as one mesh a frame, its surface, and leave its
-            particles out; options of :class:`~particlesim.surface.Surface`, or True for none.
+            particles out; options of :class:`~particlesim.Surface`, or True for none.
         resume: Go on after the recorded frame of this number; those after it are replaced.
 
     Raises:

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from . import validate
-from .kernels import marching_cubes as cubes
-from .kernels import surface as kernels
-from .launch import CHUNK, Launch, launch
+from .. import validate
+from ..kernels import marching_cubes as cubes
+from ..kernels import surface as kernels
+from ..launch import CHUNK, Launch, launch
 
 CELL = 2.0  # of the hash grids, in smoothing lengths
 CELLS_PER_PARTICLE, MAX_CELLS = 4, 256

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Tf
 
-from . import validate
-from .usd_geometry import vertex_normals
-from .usd_info import LinksPrim, MeshPrim, PointsPrim, StageInfo, particle_ids, row_indices
-from .usd_info import row_pairs as checked_pairs
-from .usd_shapes import Shape
+from .. import validate
+from .geometry import vertex_normals
+from .info import LinksPrim, MeshPrim, PointsPrim, StageInfo, particle_ids, row_indices
+from .info import row_pairs as checked_pairs
+from .shapes import Shape
 
 OWNER = "UsdRecorder.write"
 KINDS: dict[int | str, Sdf.ValueTypeName] = {

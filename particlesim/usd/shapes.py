@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from . import validate
+from .. import validate
 
 # What the two parameters of each kind are.
 SHAPES = {

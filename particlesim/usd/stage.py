@@ -20,7 +20,7 @@ from collections.abc import Iterable
 import numpy as np
 from pxr import Sdf, Vt
 
-from .usd_clips import (
+from .clips import (
     WORLD,
     Fields,
     Layout,
@@ -29,8 +29,8 @@ from .usd_clips import (
     declare_points,
     room,
 )
-from .usd_frame import Frame
-from .usd_geometry import (
+from .frame import Frame
+from .geometry import (
     CORNERS,
     EDGES,
     FACES,
@@ -42,9 +42,9 @@ from .usd_geometry import (
     viewpoint,
     world_boxes,
 )
-from .usd_info import Color, LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
-from .usd_look import CLEAR, Materials, author_camera, author_lights
-from .usd_prims import (
+from .info import Color, LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
+from .look import CLEAR, Materials, author_camera, author_lights
+from .prims import (
     Types,
     author,
     define,

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from .simulation import Simulation
+    from ..simulation import Simulation
 
 REFINEMENTS = (1, 2, 4)
 AGREE = np.sqrt(2.0)  # ratio of speeds, that is a factor of two in energy

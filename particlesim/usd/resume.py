@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Tf
 
-from . import usd_clips, usd_stage, validate
-from .usd_clips import Fields, Layout
-from .usd_info import StageInfo
+from .. import validate
+from . import stage
+from .clips import Fields, Layout, manifest
+from .info import StageInfo
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +56,12 @@ def take_up(
         newest = Sdf.Layer.OpenAsAnonymous(str(files[-1]))
     except (Tf.ErrorException, OSError) as error:
         raise _refused(root, "a file of it cannot be read") from error
-    info = usd_stage.sized(info, list(_points(clip, paths, first)))
-    manifest = usd_clips.manifest(paths, fields, info)
-    if found.ExportToString() != manifest.ExportToString():
+    info = stage.sized(info, list(_points(clip, paths, first)))
+    expected = manifest(paths, fields, info)
+    if found.ExportToString() != expected.ExportToString():
         raise _refused(root, "it was recorded with other groups, fields or settings")
     notes = dict(newest.customLayerData.get("particlesim", {}))
-    return TakenUp(layer, manifest, info, first, end, notes)
+    return TakenUp(layer, expected, info, first, end, notes)
 
 
 def _points(clip: Sdf.Layer, paths: Layout, frame: int) -> Iterator[np.ndarray]:

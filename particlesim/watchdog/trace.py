@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..observers import FORCE, Observer
 from .limits import FAST, FINITE
-from .observers import FORCE, Observer
 
 if TYPE_CHECKING:
-    from .simulation import Simulation
+    from ..simulation import Simulation
 
 
 SHARE = 0.1  # of its velocity that a part must have added within the substep to have done it

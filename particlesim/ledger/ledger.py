@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import validate
+from .. import validate
 
 if TYPE_CHECKING:
-    from .simulation import Simulation
+    from ..simulation import Simulation
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Ledger:
     ``ledger[name]`` is the :class:`Entry` of that name; the second of a name has `` 2`` behind it.
     ``kinetic_change`` (worlds,), ``momentum_change`` and ``angular_momentum_change`` (worlds, 3)
     are those since the start, without what was written from outside. ``str()`` makes the table,
-    summed over worlds. The definitions are in :mod:`particlesim.accounts`.
+    summed over worlds. The definitions are in :mod:`particlesim.ledger.accounts`.
 
     Example:
         >>> from particlesim import Scene, Settings, Simulation, UniformGravity

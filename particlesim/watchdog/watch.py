@@ -1,7 +1,7 @@
 """Watchdog: finds what goes wrong within a frame, and does what the settings say about it.
 
 On the device it is one launch a frame, which compares every particle with the limits of its world
-(see :mod:`particlesim.limits`) and raises a flag; the host reads the flag between frames. All else
+(see :mod:`.limits`) and raises a flag; the host reads the flag between frames. All else
 happens only when it is up.
 """
 
@@ -14,20 +14,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from ..diagnostics import blocks
+from ..errors import SimulationError, SimulationWarning
+from ..kernels.watchdog import check_kernel, hold_kernel
+from ..launch import launch, owner
+from ..world_rows import arrays_by_world, put, take
 from .audit import causes
-from .diagnostics import blocks
-from .errors import SimulationError, SimulationWarning
 from .incident import Incident
-from .kernels.watchdog import check_kernel, hold_kernel
-from .launch import launch, owner
 from .limits import ESCAPED, FAST, FINITE, Limits
 from .trace import Culprit, survey, trace
-from .world_rows import arrays_by_world, put, take
 
 if TYPE_CHECKING:
-    from .model import Model
-    from .neighbors import Neighbors
-    from .simulation import Simulation
+    from ..model import Model
+    from ..neighbors import Neighbors
+    from ..simulation import Simulation
 
 KINDS = {FINITE: "not finite", ESCAPED: "escaped", FAST: "runaway"}
 BLOCK_CPU, BLOCK_CUDA = 256, 8  # particles that a thread looks at

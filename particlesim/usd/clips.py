@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Tf, Vt
 
-from .usd_frame import KINDS, Frame, Surface, primvar
-from .usd_geometry import extent
-from .usd_info import LinksPrim, MeshPrim, PointsPrim, StageInfo
-from .usd_prims import Types, author, floats, integers, matrix, vectors
+from .frame import KINDS, Frame, Surface, primvar
+from .geometry import extent
+from .info import LinksPrim, MeshPrim, PointsPrim, StageInfo
+from .prims import Types, author, floats, integers, matrix, vectors
 
 WORLD = Sdf.Path("/World")
 # Names that a world's room has for other things than its groups.

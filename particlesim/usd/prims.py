@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Sdf, Vt
 
-from .usd_geometry import extent
+from .geometry import extent
 
 Types = Sdf.ValueTypeNames
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from .constraints.boundary_base import Boundary
-from .constraints.constraint import Constraint
-from .constraints.contact import Contact
-from .kernels import residual as kernels
-from .kernels.rigid_motion import pose_kernel
-from .launch import launch
+from ..constraints.boundary_base import Boundary
+from ..constraints.constraint import Constraint
+from ..constraints.contact import Contact
+from ..kernels import residual as kernels
+from ..kernels.rigid_motion import pose_kernel
+from ..launch import launch
 
 if TYPE_CHECKING:
-    from .simulation import Simulation
+    from ..simulation import Simulation
 
 
 def residuals(constraint: Any, sim: Simulation) -> tuple[np.ndarray, np.ndarray] | None:

@@ -20,11 +20,11 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from . import files, validate
-from .history_sample import sample
+from .. import files, validate
+from .sample import sample
 
 if TYPE_CHECKING:
-    from .simulation import Simulation
+    from ..simulation import Simulation
 
 SUFFIXES = (".csv", ".jsonl")
 OWN = ("frame", "time", "world")  # what every line starts with
@@ -37,7 +37,7 @@ class History:
     ``potential``, ``energy``; ``potential:<interaction>`` of each that has one;
     ``density_error_max:<fluid>`` and ``density_error_rms:<fluid>`` of rho / rho0 - 1, where there
     is a rest density; ``residual_max:<constraint>`` and ``residual_rms:<constraint>`` (see
-    :func:`particlesim.residuals.residuals`). A run with a history goes as one without, bit for bit.
+    :mod:`particlesim.history.residuals`). A run with a history goes as one without, bit for bit.
 
     Args:
         sim: The simulation.
