@@ -33,7 +33,8 @@ class Settings:
             (second order, scenes without constraints).
         precision: ``"float32"`` or ``"float64"``, in every kernel.
         skin: Added to the cutoff of neighbour lists [length]; they are rebuilt when a particle has
-            moved half of it. Changes the cost, not the forces. None: 0.12 of the cutoff.
+            moved half of it. Changes the cost, not the forces. None: 0.12 of the cutoff, 0.2 of
+            that of contacts.
         compensated: Carry the rounding error of positions and velocities along (Kahan 1965), so
             that neither freezes where an increment is below the last bit.
         relaxation: Factor on averaged (Jacobi) contact corrections, above 0, at most 1: more would
