@@ -36,9 +36,14 @@ class Launch:
     def issue(self) -> None:
         wp.launch(self.kernel, self.dim, [0, *self.inputs], device=self.device)
 
-    def record(self, chunks: int = 1) -> list[Any]:
-        """Commands with packed arguments: a chunk is the same launch from another first row."""
-        pieces = max(1, min(chunks, self.dim // CHUNK))
+    def record(self, chunks: int = 1, least: int = CHUNK) -> list[Any]:
+        """Commands with packed arguments: a chunk is the same launch from another first row.
+
+        Args:
+            chunks: How many at most.
+            least: Rows of a chunk.
+        """
+        pieces = max(1, min(chunks, self.dim // least))
         edges = [self.dim * k // pieces for k in range(pieces + 1)]
         return [
             wp.launch(

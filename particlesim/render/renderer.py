@@ -110,11 +110,11 @@ class _Drawing:
 
     def image(self) -> Image:
         crew, look = self.crew, self.look
-        seen = Screen(crew, self.view, self.solids, self._ground())
+        seen = Screen(crew, "camera", self.view, self.solids, self._ground())
         sun = self._sun()
         light = self._light(sun)
         pixels = self.size[0] * self.size[1]
-        open_sky = crew.empty(self.size, wp.float32)
+        open_sky = crew.kept("sky", self.size, wp.float32)
         normal = wp.vec3(*(self.axes @ look.up))
         if look.occlusion and not look.flat:
             crew.launch(
@@ -122,7 +122,7 @@ class _Drawing:
                 [self.view, seen.shapes, light, self.normals, self.colors, normal,
                  crew.array(_spirals(), wp.vec2), self.step, seen.depth, seen.shape, open_sky],
             )  # fmt: skip
-        color = crew.empty(self.size, wp.vec3)
+        color = crew.kept("color", self.size, wp.vec3)
         crew.launch(
             render_shade.shade_pixels, pixels,
             [self.view, sun.view, seen.shapes, light, self.normals, self.colors, normal,
@@ -150,7 +150,7 @@ class _Drawing:
             view_axes(back, helper), self.bounds.center + 2.0 * half * back, (half, half),
             size, size, near=0.0, parallel=True,
         )  # fmt: skip
-        return Screen(self.crew, view, self.bodies if size > 1 else _nothing(self.crew))
+        return Screen(self.crew, "sun", view, self.bodies if size > 1 else _nothing(self.crew))
 
     def _light(self, sun: Screen) -> Any:
         look, bounds = self.look, self.bounds

@@ -47,6 +47,7 @@ class Lists:
 
     Args:
         crew: Runs the kernels.
+        name: Of the memory that its pixels are kept in.
         view: The view.
         boxes: Samples of each shape, ``vec4i``.
         nearest: Smallest depth of each, ``float32``.
@@ -96,6 +97,7 @@ class Screen:
 
     Args:
         crew: Runs the kernels.
+        name: Of the memory that its pixels are kept in.
         view: The view.
         solids: Spheres, ends of cones and corners of triangles, in the scene's space, by
             ``ball``, ``cone`` and ``corner``.
@@ -106,13 +108,15 @@ class Screen:
     def __init__(
         self,
         crew: Crew,
+        name: str,
         view: Any,
         solids: dict[str, wp.array],
         ground: tuple[np.ndarray, float] | None = None,
     ):
         self.view = view
-        self.depth = crew.empty((view.height, view.width), wp.float32)
-        self.shape = crew.empty((view.height, view.width), wp.int32)
+        size = (view.height, view.width)
+        self.depth = crew.kept(f"{name} depth", size, wp.float32)
+        self.shape = crew.kept(f"{name} shape", size, wp.int32)
         normal, height = (np.zeros(3), 0.0) if ground is None else ground
         crew.launch(
             render_draw.clear_tiles, tile_count(view),
