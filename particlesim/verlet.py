@@ -235,7 +235,9 @@ class VerletList(AllPairs):
         """If a row was full: make room for as many as were found. The rows are then empty."""
         if not self.overflow.numpy()[0]:
             return False
-        self._resize(int(1.25 * self.pairs.count.numpy().max()) + 8)
+        # The rows that were full may have been those of an earlier substep: always longer than now.
+        longest = max(int(self.pairs.count.numpy().max()), self.capacity)
+        self._resize(int(1.25 * longest) + 8)
         self.overflow.zero_()
         return True
 

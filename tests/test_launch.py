@@ -17,6 +17,12 @@ from particlesim.threads import Chain, Team
 WAYS = [("graph", None), ("threads", 1), ("threads", 2), ("threads", 3), ("auto", 2)]
 
 
+@ps.law
+def weak(r: float, strength: float):
+    """Next to nothing."""
+    return strength * (1.0 - r)
+
+
 @pytest.fixture
 def melt(liquid):
     """A function that makes a liquid of 6912 atoms, large enough to be cut, and its settings."""
@@ -108,6 +114,25 @@ def test_rows_that_grow_within_a_run(execution, threads):
     roomy.run(15)
     assert roomy.neighbors.lists[0].generation == 2
     np.testing.assert_array_equal(sim.position, roomy.position)
+
+
+def test_rows_that_are_full_for_a_moment_only():
+    # Two groups of 300 pass through each other within a frame: rows are full in its middle, and
+    # short again at its end, where the host looks.
+    rng = np.random.default_rng(0)
+    x = rng.uniform(-0.5, 0.5, (600, 3))
+    side = np.repeat([-1.0, 1.0], 300)
+    x[:, 0] += 6.0 * side
+    scene = ps.Scene()
+    v = np.stack([-12.0 * side, 0 * side, 0 * side], axis=1)
+    scene.add_particles(x, velocity=v)
+    scene.add_interaction(ps.PairForce(weak, cutoff=1.0, strength=1e-6))
+    settings = ps.Settings(dt=1.0, substeps=100, skin=0.1, execution="graph")
+    sim = ps.Simulation(scene, settings, device="cpu")
+    before = sim.neighbors.lists[0].capacity
+    sim.step()
+    assert before < 450 < sim.neighbors.lists[0].capacity
+    np.testing.assert_allclose(sim.position[:, 0], x[:, 0] + v[:, 0], rtol=1e-4)
 
 
 def test_a_long_frame_is_replayed_substep_by_substep(liquid):
