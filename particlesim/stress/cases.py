@@ -66,6 +66,12 @@ def _knobs(settings: Settings) -> list[Case]:
         "depenetration_speed": (1e-6, 1e6),
         "execution": ("graph", "threads"),
         "threads": (1, 2 * (os.cpu_count() or 1)),
+        "watchdog": (False, True),
+        "on_failure": ("stop", "retry", "freeze"),
+        "retries": (1, 12),
+        "energy_growth": (1.5, 1e12),
+        "ledger": (False, True),
+        "safety": (0.01, 1.0),
     }
     return [
         Case(f"{name} = {value}", _knob(name, value))

@@ -175,14 +175,37 @@ def box():
     return scene
 
 
+def sphere():
+    scene = _cloud(27)
+    scene.add_interaction(ps.UniformGravity())
+    scene.add_constraint(ps.SphereBoundary((0, 0, 0), 2.5, friction=0.1, restitution=0.5))
+    return scene
+
+
+def moving_plane():
+    scene = _cloud(27)
+    scene.add_interaction(ps.UniformGravity())
+    scene.add_constraint(
+        ps.PlaneBoundary((0, -1.6, 0), (0, 1, 0), friction=0.5, velocity=(1, 0.5, 0))
+    )
+    return scene
+
+
+def penalty():
+    scene = _line()
+    scene.add_interaction(ps.Distance(_pairs(), compliance=1e-2).as_force())
+    return scene
+
+
 FAMILIES = {
     build.__name__: (build, settings)
     for settings, builds in {
         VERLET: (
             free_fall, constant_force, particle_force, pair_force, pair_potential, lennard_jones,
-            periodic_lennard_jones, gravity, springs, drag,
+            periodic_lennard_jones, gravity, springs, drag, penalty,
         ),
-        EULER: (sph, distance, soft_distance, own_constraint, contact, plane, box),
+        EULER: (sph, distance, soft_distance, own_constraint, contact, plane, box, sphere,
+                moving_plane),
     }.items()
     for build in builds
 }  # fmt: skip

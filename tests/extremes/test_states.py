@@ -325,6 +325,54 @@ def test_a_dense_seeding_expands_without_a_blast(device):
     assert np.abs(sim.diagnostics().momentum).max() < 1e-2 * sim.diagnostics().mass[0]
 
 
+def test_a_solid_placed_in_water_pushes_it_away_and_no_more(device):
+    # Pinned particles amid the water, half a spacing off: what is gained is the energy of the
+    # overlap at the start, and what leaves is slower than sound.
+    spacing, c = 0.05, 10.0
+    x = ps.sample.box((0, 0, 0), (0.4, 0.4, 0.4), spacing)
+    solid = ps.sample.box((0.15, 0.15, 0.15), (0.25, 0.25, 0.25), spacing) + 0.5 * spacing
+    scene = ps.Scene()
+    scene.add_particles(x, mass=1000 * spacing**3)
+    scene.add_particles(solid, mass=1000 * spacing**3, pinned=True)
+    scene.add_interaction(
+        ps.SPH(smoothing_length=0.06, rest_density=1000.0, equation_of_state=ps.Tait(c),
+               viscosity=ps.ArtificialViscosity(0.1))
+    )  # fmt: skip
+    sim = ps.Simulation(scene, ps.Settings(dt=1e-3, substeps=10), device=device)
+    start = sim.diagnostics().energy[0]
+    sim.run(40)
+    assert sim.diagnostics().energy[0] <= start * (1 + 1e-3)
+    assert np.linalg.norm(sim.velocity, axis=1).max() < c
+
+
+@pytest.mark.parametrize(("rate", "bounded"), [(1.9, True), (2.1, False)])
+def test_the_limit_of_drag(rate, bounded, device):
+    # v falls or grows by 1 - gamma dt a step.
+    scene = ps.Scene()
+    scene.add_particles([(0, 0, 0)], velocity=(1, 0, 0))
+    scene.add_interaction(ps.Drag(linear=rate))
+    sim = ps.Simulation(scene, ps.Settings(dt=10.0, substeps=10), device=device)
+    if bounded:
+        sim.run(4)
+        assert abs(sim.velocity[0, 0]) == pytest.approx(0.9**40, rel=1e-3)
+    else:
+        with pytest.warns(ps.StabilityWarning, match="Drag"):
+            sim.run(1)
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_nobody_and_nobody_else(count, precision, device):
+    scene = ps.Scene()
+    scene.add_particles(np.zeros((count, 3)), radius=0.1, velocity=(1, 0, 0))
+    for part in (ps.LennardJones(cutoff=1.0), ps.Gravity(), ps.Drag(0.0)):
+        scene.add_interaction(part)
+    scene.add_constraint(ps.Contact())
+    scene.add_constraint(ps.PlaneBoundary((0, -1, 0), (0, 1, 0)))
+    sim = simulate(scene, 3, device, precision=precision)
+    assert sim.diagnostics().mass[0] == count
+    np.testing.assert_allclose(sim.position, np.tile((3 / 60, 0, 0), (count, 1)), rtol=1e-5)
+
+
 @pytest.mark.slow
 def test_a_million_steps(device):
     # Verlet's energy error of an oscillator stays (phase / 2)^2 of itself for ever; rounding adds
