@@ -196,10 +196,11 @@ def test_every_second_frame(tmp_path, suffix):
 # What is refused --------------------------------------------------------------------------------
 
 
-def test_arguments_that_do_not_fit(tmp_path, refused):
+def test_arguments_that_do_not_fit(tmp_path, monkeypatch, refused):
+    monkeypatch.chdir(tmp_path)  # messages shorten long paths
     sim = ps.Simulation(worlds(), device="cpu")
-    with refused("end in one of .usda, .usd, .usdc, .npz, .ply, .gsd, .vtkhdf, got '.*out.abc'"):
-        open_recorder(sim, tmp_path / "out.abc")
+    with refused("end in one of .usda, .usd, .usdc, .npz, .ply, .gsd, .vtkhdf, got 'out.abc'"):
+        open_recorder(sim, "out.abc")
     with refused("existing folder", FileNotFoundError):
         open_recorder(sim, tmp_path / "none" / "out.npz")
     with refused("option must be one of frames, fields, .*got 'color_by'", TypeError):
