@@ -1,5 +1,7 @@
 """States that are known to have broken one program or another, each bounded and right here."""
 
+import subprocess
+import sys
 import warnings
 
 import numpy as np
@@ -253,6 +255,52 @@ def test_speeds_below_every_normal_number(device):
     sim = simulate(scene, 10, device)
     assert 0 <= sim.velocity[0, 0] <= 1.1e-42
     assert 0 <= sim.position[0, 0] <= 1e-42
+
+
+FAST = """
+import numpy as np
+import particlesim as ps
+from particlesim.kernels import precision
+
+make, built = precision.kernel, []
+
+
+def kernel(function):
+    made = make(function)
+    made.module.options["fast_math"] = True
+    built.append(made)
+    return made
+
+
+precision.kernel = kernel
+scene = ps.Scene(periodic=((0, 0, 0), (6.8, 6.8, 6.8)))
+x = ps.sample.lattice("fcc", (4, 4, 4), 1.7)
+scene.add_particles(x, velocity=ps.sample.maxwell_boltzmann(len(x), 1.0, 1.0, seed=1))
+scene.add_interaction(ps.LennardJones(cutoff=2.5))
+settings = ps.Settings(dt=0.02, substeps=5, integrator="velocity_verlet")
+sim = ps.Simulation(scene, settings, device="cpu")
+start = sim.diagnostics()
+sim.run(20)
+end = sim.diagnostics()
+assert any("sum_over_partners" in each.key for each in built)
+assert abs(end.energy - start.energy)[0] < 0.02 * start.kinetic[0], end.energy - start.energy
+assert np.abs(end.momentum).max() < 1e-3
+sim.position = np.where(np.arange(len(x))[:, None] < 2, 0.0, sim.position)
+try:
+    sim.run(1)
+except ps.SimulationError as error:
+    print("named:", error)
+"""
+
+
+def test_fast_mathematics_still_conserves_and_still_names_what_is_wrong(tmp_path):
+    # Built so that the compiler may assume that nothing is NaN: the watchdog must find it all the
+    # same. In a process of its own, as kernels are made once a process.
+    script = tmp_path / "fast.py"
+    script.write_text(FAST)
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert "named: Simulation: " in done.stdout
 
 
 # Intervals --------------------------------------------------------------------------------------
