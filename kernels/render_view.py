@@ -41,12 +41,6 @@ def to_view(view: Any, x: wp.vec3) -> wp.vec3:
 
 
 @wp.func
-def turn_to_view(view: Any, n: wp.vec3) -> wp.vec3:
-    """A direction of the scene in the view's space."""
-    return wp.vec3(wp.dot(view.right, n), wp.dot(view.up, n), wp.dot(view.back, n))
-
-
-@wp.func
 def from_view(view: Any, p: wp.vec3) -> wp.vec3:
     """A point of the view's space in the scene."""
     return view.eye + p[0] * view.right + p[1] * view.up + p[2] * view.back

@@ -82,7 +82,6 @@ class ThreadExecutor:
     name = "threads"
 
     def __init__(self, frame: Frame, threads: int):
-        frame.load()
         self.team = Team(threads)
         before, substep, after = (_steps(part, self.team, threads) for part in frame.parts)
         self._parts = [(before, 1), (substep, frame.repeat), (after, 1)]

@@ -105,8 +105,7 @@ def stress(
     debug: Debug = False,
 ) -> None:
     """Run a scene at the extremes, and say where it held, refused, recovered or failed."""
-    meter = Meter()
-    with one_line_errors(meter, debug):
+    with one_line_errors(Meter(), debug):
         from ..stress import command
 
         if not debug:
