@@ -1,46 +1,61 @@
 """particlesim: a general particle-physics framework on NVIDIA Warp."""
 
-from . import sample
-from .constraints import (
-    BoxBoundary,
-    Constraint,
-    ConstraintForce,
-    Contact,
-    Distance,
-    PlaneBoundary,
-    SphereBoundary,
-)
-from .errors import SimulationError, SimulationWarning
-from .history import History, read_history
-from .interactions import (
-    SPH,
-    ArtificialViscosity,
-    ConstantForce,
-    Drag,
-    Gravity,
-    Interaction,
-    LennardJones,
-    PairForce,
-    PairPotential,
-    ParticleForce,
-    Polytrope,
-    Springs,
-    Tait,
-    UniformGravity,
-)
-from .law import Law, law
-from .ledger import Ledger
-from .render import Camera
-from .scene import Group, Scene
-from .settings import Settings
-from .simulation import Simulation
-from .stability import Stability, StabilityWarning
-from .stress import Stress, stress
-from .surface import Surface
-from .tradeoff import Tradeoff, tradeoff
-from .tune import Tuned, tune
-from .usd import UsdRecorder
-from .watchdog.incident import Incident
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+
+def _adopt(name: str) -> None:
+    """In a plain checkout kernels and scenes lie beside this folder: import them from there."""
+    folder = Path(__file__).parent.parent / name
+    if (Path(__file__).parent / name).is_dir() or not folder.is_dir():
+        return
+    spec = spec_from_file_location(
+        f"{__name__}.{name}", folder / "__init__.py", submodule_search_locations=[str(folder)]
+    )
+    assert spec is not None and spec.loader is not None
+    module = sys.modules[spec.name] = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    globals()[name] = module
+
+
+_adopt("kernels")
+_adopt("scenes")
+
+from .accuracy.stress.sweep import stress
+from .accuracy.stress.table import Stress
+from .accuracy.tradeoff.sweep import tradeoff
+from .accuracy.tradeoff.table import Tradeoff
+from .accuracy.tune.report import Tuned
+from .accuracy.tune.tuning import tune
+from .constraints.boundary import BoxBoundary, PlaneBoundary, SphereBoundary
+from .constraints.constraint import Constraint
+from .constraints.contact import Contact
+from .constraints.distance import Distance
+from .constraints.force import ConstraintForce
+from .instruments.errors import SimulationError, SimulationWarning
+from .instruments.ledger.ledger import Ledger
+from .instruments.stability.check import StabilityWarning
+from .instruments.stability.report import Stability
+from .instruments.watchdog.incident import Incident
+from .interactions.base import Interaction
+from .interactions.fluid.equations_of_state import Polytrope, Tait
+from .interactions.fluid.sph import SPH
+from .interactions.fluid.viscosities import ArtificialViscosity
+from .interactions.gravity import Gravity
+from .interactions.lennard_jones import LennardJones
+from .interactions.pair import PairForce, PairPotential
+from .interactions.particle import ConstantForce, Drag, ParticleForce, UniformGravity
+from .interactions.springs import Springs
+from .output.history.writer import History, read_history
+from .output.surface.surface import Surface
+from .output.usd.recorder import UsdRecorder
+from .pictures.render.camera import Camera
+from .scene import sample
+from .scene.law import Law, law
+from .scene.scene import Group, Scene
+from .scene.settings import Settings
+from .simulation.simulation import Simulation
 
 __version__ = "0.1.0"
 

@@ -1,4 +1,4 @@
-"""The command line: list, run, explain and measure scenes (see :mod:`particlesim.scene_files`).
+"""The command line: list, run, explain and measure scenes (see :mod:`particlesim.commands.scene_files`).
 
 Exit codes: 0 done, 1 a run that failed, 2 arguments that do not fit, 130 interrupted. Whatever goes
 wrong is one line on stderr. Warp and USD are imported only when a scene is, so that help is quick.

@@ -12,9 +12,9 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from particlesim.checkpoint import contents
-from particlesim.fingerprint import fingerprint
-from particlesim.scene_files import ready_scenes
+from particlesim.commands.scene_files import ready_scenes
+from particlesim.output.checkpoint import contents
+from particlesim.scene.fingerprint import fingerprint
 
 SCENES = list(ready_scenes())
 SMALL = {

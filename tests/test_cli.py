@@ -10,8 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 import particlesim
-from particlesim import cli, scene_files
-from particlesim.commands import run, shell
+from particlesim import cli
+from particlesim.commands import run, scene_files, shell
 
 SCENE = '''
     """A test scene.

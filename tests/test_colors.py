@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from particlesim import colors
+from particlesim.output import colors
 
 # How far the maps are from matplotlib's, in any channel of sRGB. Polynomials: as fitted. Cubehelix:
 # single precision. Coolwarm: matplotlib draws straight lines in sRGB between 33 colours.

@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from particlesim import topology
+from particlesim.engine import topology
 
 RNG = np.random.default_rng(7)
 

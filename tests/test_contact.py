@@ -452,7 +452,7 @@ def test_plain_loop_equals_native(monkeypatch):
     found = []
     for vectorised in (True, False):
         scene = grains(**cloud(60), contact={"friction": 0.4, "restitution": 0.5})
-        monkeypatch.setattr("particlesim.model.Model.vectorised", vectorised, raising=False)
+        monkeypatch.setattr("particlesim.engine.model.Model.vectorised", vectorised, raising=False)
         sim = simulate(scene, dt=0.02)
         sim.run(10)
         found.append(sim.position)

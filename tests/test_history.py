@@ -14,10 +14,10 @@ import pytest
 
 import particlesim as ps
 from particlesim import cli
-from particlesim.history.plots import PANELS, chosen, figure, plot_history
-from particlesim.history.residuals import residuals
-from particlesim.history.sample import sample
-from particlesim.history.writer import History, read_history
+from particlesim.instruments.residuals import residuals
+from particlesim.output.history.plots import PANELS, chosen, figure, plot_history
+from particlesim.output.history.sample import sample
+from particlesim.output.history.writer import History, read_history
 
 OMEGA, STEPS = 2 * math.pi, 40  # of the oscillator: one period a second, steps a frame of 1/10 s
 

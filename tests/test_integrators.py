@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from particlesim.integrators import METHODS
+from particlesim.engine.integrators import METHODS
 
 
 @ps.law

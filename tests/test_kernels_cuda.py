@@ -13,14 +13,15 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from particlesim import kernels, launch
-from particlesim.frames import record_frame
-from particlesim.history.sample import sample
+from particlesim import kernels
+from particlesim.commands.scene_files import load_scene, ready_scenes
+from particlesim.engine.execution import launch
+from particlesim.engine.execution.frames import record_frame
+from particlesim.engine.execution.launch import Launch, Program
+from particlesim.engine.model import Model
 from particlesim.kernels.precision import KERNELS
-from particlesim.launch import Launch, Program
-from particlesim.model import Model
-from particlesim.render import renderer  # noqa: F401 - its kernels are to be compiled too
-from particlesim.scene_files import load_scene, ready_scenes
+from particlesim.output.history.sample import sample
+from particlesim.pictures.render import renderer  # noqa: F401 - its kernels are to be compiled too
 
 ARCH = 90
 

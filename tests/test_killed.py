@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom
 
-from particlesim import resume
+from particlesim.simulation import resume
 
 sys.path.append(str(Path(__file__).parent))
 from kill_nursery import swing

@@ -8,11 +8,11 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from particlesim import launch
-from particlesim.executors import EagerExecutor, GraphExecutor, ThreadExecutor
-from particlesim.frames import evaluate_forces
-from particlesim.launch import CHUNK, Frame, Launch, Program, When
-from particlesim.threads import Chain, Team
+from particlesim.engine.execution import launch
+from particlesim.engine.execution.executors import EagerExecutor, GraphExecutor, ThreadExecutor
+from particlesim.engine.execution.frames import evaluate_forces
+from particlesim.engine.execution.launch import CHUNK, Frame, Launch, Program, When
+from particlesim.engine.execution.threads import Chain, Team
 
 WAYS = [("graph", None), ("threads", 1), ("threads", 2), ("threads", 3), ("auto", 2)]
 

@@ -8,7 +8,7 @@ import warp as wp
 
 import particlesim as ps
 from particlesim.cli import main
-from particlesim.scene_files import load_scene, ready_scenes
+from particlesim.commands.scene_files import load_scene, ready_scenes
 
 G = 10.0
 SMALL = {

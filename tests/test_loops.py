@@ -8,7 +8,7 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from particlesim.model import Model
+from particlesim.engine.model import Model
 
 SIDE = 7.0
 CUTOFF = 2.5

@@ -6,8 +6,8 @@ import warp as wp
 from pxr import Sdf, Usd, UsdGeom
 
 import particlesim as ps
-from particlesim.colors import colored
-from particlesim.usd_tools import check
+from particlesim.output.colors import colored
+from particlesim.output.usd_tools import check
 
 
 def opened(path):

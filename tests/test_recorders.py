@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from particlesim.recorders import BackgroundWriter, PlyRecorder, open_recorder
-from particlesim.recorders.background import DEPTH
+from particlesim.output.recorders import open_recorder
+from particlesim.output.recorders.background import DEPTH, BackgroundWriter
+from particlesim.output.recorders.ply import PlyRecorder
 
 FIELDS = ["speed", "force", "charge"]
 
@@ -280,7 +281,7 @@ def test_what_a_job_raises_comes_out_once_and_ends_the_writing():
 
 
 def test_the_next_frame_computes_while_the_last_one_is_written(tmp_path, monkeypatch):
-    from particlesim.recorders.npz import NpzRecorder
+    from particlesim.output.recorders.npz import NpzRecorder
 
     sim, rest = ps.Simulation(worlds(), ps.Settings(dt=0.1), device="cpu"), 0.04
     step, save = sim.step, NpzRecorder._save
@@ -296,7 +297,7 @@ def test_the_next_frame_computes_while_the_last_one_is_written(tmp_path, monkeyp
 
 
 def test_an_interrupted_run_keeps_what_was_captured(tmp_path, monkeypatch):
-    from particlesim.recorders.npz import NpzRecorder
+    from particlesim.output.recorders.npz import NpzRecorder
 
     save = NpzRecorder._save
     monkeypatch.setattr(

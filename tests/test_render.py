@@ -7,13 +7,13 @@ import pytest
 from PIL import Image as Pillow
 
 import particlesim as ps
-from particlesim import colors
-from particlesim.render import look as looks
-from particlesim.render import screen
-from particlesim.render.geometry import Geometry
-from particlesim.render.image import Image
-from particlesim.render.look import Look
-from particlesim.render.renderer import Renderer
+from particlesim.output import colors
+from particlesim.pictures.render import look as looks
+from particlesim.pictures.render import screen
+from particlesim.pictures.render.geometry import Geometry
+from particlesim.pictures.render.image import Image
+from particlesim.pictures.render.look import Look
+from particlesim.pictures.render.renderer import Renderer
 
 WIDTH, HEIGHT = 320, 240
 CAMERA = ps.Camera((0, 0, 10), (0, 0, 0), field_of_view=40.0)

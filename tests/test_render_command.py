@@ -13,8 +13,8 @@ from PIL import ImageSequence
 
 import particlesim as ps
 from particlesim import cli
-from particlesim.render import film
-from particlesim.render.film import Gif, Mp4, open_film
+from particlesim.pictures.render import film
+from particlesim.pictures.render.film import Gif, Mp4, open_film
 
 SMALL = ("--width", "64", "--height", "36")
 BLENDER = os.environ.get("BLENDER_PYTHON") or (

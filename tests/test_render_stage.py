@@ -5,12 +5,12 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
 import particlesim as ps
-from particlesim import colors
-from particlesim.render.look import Look
-from particlesim.render.paint import Paint, field_names, spanned
-from particlesim.render.preview import ground_height, seen
-from particlesim.render.renderer import Renderer
-from particlesim.render.stage import look_at
+from particlesim.output import colors
+from particlesim.pictures.render.look import Look
+from particlesim.pictures.render.paint import Paint, field_names, spanned
+from particlesim.pictures.render.preview import ground_height, seen
+from particlesim.pictures.render.renderer import Renderer
+from particlesim.pictures.render.stage import look_at
 
 RED = Vt.Vec3fArray([Gf.Vec3f(1, 0, 0)])
 

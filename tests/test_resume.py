@@ -11,8 +11,9 @@ import pytest
 from pxr import Sdf, Usd
 
 import particlesim as ps
-from particlesim import checkpoint, resume
-from particlesim.history.writer import read_history
+from particlesim.output import checkpoint
+from particlesim.output.history.writer import read_history
+from particlesim.simulation import resume
 
 FORMATS = [".usda", ".usdc", ".npz", ".ply", ".gsd", ".vtkhdf"]
 NEEDS = {".gsd": "gsd", ".vtkhdf": "h5py"}

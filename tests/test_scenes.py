@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from particlesim.scene_files import ready_scenes
+from particlesim.commands.scene_files import ready_scenes
 
 NAMES = list(ready_scenes())
 SMALL = {

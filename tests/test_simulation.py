@@ -7,9 +7,9 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from particlesim import launch
 from particlesim.constraints.base import ConstraintBase
-from particlesim.launch import Program
+from particlesim.engine.execution import launch
+from particlesim.engine.execution.launch import Program
 
 
 def drifting(count=3, **options):
@@ -69,7 +69,7 @@ def order(monkeypatch):
         calls.append(kernel.key.rpartition("__")[2])
         original(kernel, dim, inputs, device)
 
-    monkeypatch.setattr("particlesim.integrators.launch", spy)
+    monkeypatch.setattr("particlesim.engine.integrators.launch", spy)
     return calls
 
 

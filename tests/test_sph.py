@@ -9,8 +9,8 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from particlesim.interactions.smoothing import SMOOTHING
-from particlesim.kernels import pair as pair_kernels
+from particlesim.interactions.fluid.smoothing import SMOOTHING
+from particlesim.kernels.interactions import pair as pair_kernels
 
 EPSILON = {"float32": 2.0**-24, "float64": 2.0**-53}
 SIDE = np.array([4.0, 5.0, 6.0])
@@ -116,7 +116,7 @@ def test_plain_loop_equals_the_vectorised_one(precision, monkeypatch):
     fast = prepared(scene, precision)
     plain = pair_kernels.pair_kernel
     monkeypatch.setattr(
-        "particlesim.interactions.sph.pair_kernel",
+        "particlesim.interactions.fluid.sph.pair_kernel",
         lambda *args, vectorised: plain(*args, vectorised=False),
     )
     slow = prepared(scene, precision)
@@ -344,8 +344,8 @@ def test_no_particle_and_one(count, precision, device):
 
 def test_own_equation_of_state_and_viscosity():
     """Anyone can write one: three laws of the density, one of the pair."""
-    from particlesim.interactions.equations_of_state import EquationOfState
-    from particlesim.interactions.viscosities import Viscosity
+    from particlesim.interactions.fluid.equations_of_state import EquationOfState
+    from particlesim.interactions.fluid.viscosities import Viscosity
 
     @ps.law
     def isothermal_pressure(density: float, rest_density: float, sound_speed: float):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from particlesim.interactions.smoothing import SMOOTHING
+from particlesim.interactions.fluid.smoothing import SMOOTHING
 
 EPSILON = {"float32": 2.0**-24, "float64": 2.0**-53}
 SIDE = np.array([4.0, 5.0, 6.0])

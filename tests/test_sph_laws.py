@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from particlesim.interactions.smoothing import SMOOTHING
+from particlesim.interactions.fluid.smoothing import SMOOTHING
 from particlesim.kernels.precision import PRECISIONS, function_from_source
 
 FUNCTIONS = [(name, dimension) for name in SMOOTHING for dimension in (1, 2, 3)]

@@ -9,13 +9,14 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from particlesim.interactions.smoothing import SMOOTHING
-from particlesim.scene_files import ready_scenes
-from particlesim.stability import Limit, Probe, StabilityWarning
-from particlesim.stability.bonds import spring_bound
-from particlesim.stability.fluid import steepest
-from particlesim.stability.report import explicit_step
-from particlesim.stability.spectrum import largest
+from particlesim.commands.scene_files import ready_scenes
+from particlesim.engine.probing.probe import Probe
+from particlesim.engine.probing.spectrum import largest
+from particlesim.instruments.stability.check import StabilityWarning
+from particlesim.instruments.stability.report import Limit, explicit_step
+from particlesim.interactions.fluid.limits import steepest
+from particlesim.interactions.fluid.smoothing import SMOOTHING
+from particlesim.interactions.spring_limits import spring_bound
 
 SMALL = {
     "dam_break": {"spacing": 0.05},

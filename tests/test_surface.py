@@ -8,8 +8,8 @@ import warp as wp
 from warp.geometry import IsoSurfaceMarchingCubes
 
 import particlesim as ps
-from particlesim.surface import marching
-from particlesim.surface.marching import LEVEL_ISOTROPIC, SMOOTHED
+from particlesim.output.surface import marching
+from particlesim.output.surface.marching import LEVEL_ISOTROPIC, SMOOTHED
 
 RATIO = 1.3  # h over the spacing
 SIGMA = 21 / (16 * np.pi)

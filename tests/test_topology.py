@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from particlesim import topology
+from particlesim.engine import topology
 
 
 def test_tuples_are_checked(refused):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from particlesim.tradeoff.plan import Study
-from particlesim.tradeoff.run import array_bytes
+from particlesim.accuracy.tradeoff.plan import Study
+from particlesim.accuracy.tradeoff.run import array_bytes
 
 EXACT = ps.Settings(dt=0.1, precision="float64")
 
@@ -70,7 +70,7 @@ def test_a_sweep(device):
 
 
 def test_settings_run_in_turn(monkeypatch):
-    from particlesim.tradeoff import run
+    from particlesim.accuracy.tradeoff import run
 
     order = []
     advance = run.Run.advance

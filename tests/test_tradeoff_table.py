@@ -8,8 +8,8 @@ import sys
 import pytest
 
 import particlesim as ps
-from particlesim.tradeoff import Row, Tradeoff
-from particlesim.tradeoff.output import amount
+from particlesim.accuracy.tradeoff.output import amount
+from particlesim.accuracy.tradeoff.table import Row, Tradeoff
 
 
 def row(error, cost, cause="", **values):

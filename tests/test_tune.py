@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from particlesim.tradeoff.plan import Study
-from particlesim.tune.bench import Bench
-from particlesim.tune.reference import settled
-from particlesim.tune.report import Trial, line
-from particlesim.tune.search import Search, levels
+from particlesim.accuracy.tradeoff.plan import Study
+from particlesim.accuracy.tune.bench import Bench
+from particlesim.accuracy.tune.reference import settled
+from particlesim.accuracy.tune.report import Trial, line
+from particlesim.accuracy.tune.search import Search, levels
 
 # Scene: tolerance, frames, options, and what makes another of the same kind. Small and short, so
 # that a reference can be had: chaos comes later. The error is the known one of the pendulum [rad],

@@ -14,8 +14,8 @@ import pytest
 import warp as wp
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdValidation, Vt
 
-from particlesim.usd.info import LinksPrim, PointsPrim, Shape, StageInfo
-from particlesim.usd.writer import UsdWriter
+from particlesim.output.usd.info import LinksPrim, PointsPrim, Shape, StageInfo
+from particlesim.output.usd.writer import UsdWriter
 
 BLUE, RED = (0.2, 0.5, 0.9), (0.9, 0.2, 0.1)
 # Blender drops, without a word, every primvar after one of another type.

@@ -9,8 +9,9 @@ from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
 import particlesim as ps
 from particlesim import cli
-from particlesim.scene_files import load_scene, ready_scenes
-from particlesim.usd_tools import Fault, check, info, pack
+from particlesim.commands.scene_files import load_scene, ready_scenes
+from particlesim.output.usd_tools import check, info, pack
+from particlesim.output.usd_tools.fault import Fault
 
 FRAMES, COUNT = 5, 12  # the start state is one frame more
 PLANT = 3  # the frame in which faults are planted

@@ -18,13 +18,13 @@ import pytest
 from pxr import Gf, Usd, UsdGeom
 
 import particlesim as ps
-from particlesim import cli, colors
-from particlesim.usd.recorder import UsdRecorder
-from particlesim.view import Server
-from particlesim.view.footage import Footage
-from particlesim.view.live import Live
-from particlesim.view.packet import unpacked
-from particlesim.view.server import PAGE
+from particlesim import cli
+from particlesim.output import colors
+from particlesim.output.usd.recorder import UsdRecorder
+from particlesim.pictures.view.footage import Footage
+from particlesim.pictures.view.live import Live
+from particlesim.pictures.view.packet import unpacked
+from particlesim.pictures.view.server import PAGE, Server
 
 FRAMES, WORLDS, DROPS = 6, 4, 8
 COLOR = (0.1, 0.4, 0.9)
@@ -236,7 +236,9 @@ def test_any_usd_file(tmp_path):
 
 
 def test_the_page_is_whole_and_needs_nothing_from_elsewhere(shared):
-    files = {path.name for path in (resources.files("particlesim.view") / "page").iterdir()}
+    files = {
+        path.name for path in (resources.files("particlesim.pictures.view") / "page").iterdir()
+    }
     assert files == {name for name, _ in PAGE.values()}
     for path, (_, kind) in PAGE.items():
         status, found, body = ask(shared, path)

@@ -9,10 +9,10 @@ import pytest
 from pxr import Gf, Usd, UsdGeom, Vt
 
 import particlesim as ps
-from particlesim.usd.recorder import UsdRecorder
-from particlesim.view import Server
-from particlesim.view.footage import Footage
-from particlesim.view.live import Live
+from particlesim.output.usd.recorder import UsdRecorder
+from particlesim.pictures.view.footage import Footage
+from particlesim.pictures.view.live import Live
+from particlesim.pictures.view.server import Server
 
 playwright = pytest.importorskip("playwright.sync_api")
 
@@ -34,7 +34,7 @@ PIXELS = """() => {
   }
   return [width, height, btoa(text)];
 }"""
-READY = "() => particlesim.still && particlesim.shown === particlesim.state.index"
+READY = "() => particlesim.still && particlesim.shown === particlesim.engine.state.index"
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +124,7 @@ def test_spheres_are_true_spheres(show, tmp_path):
     with Server(Footage(tmp_path / "two.usda")) as serving:
         page = show(serving)
         page.evaluate(
-            "() => { particlesim.state.grid = false; particlesim.camera.turn(0.6, -0.2); }"
+            "() => { particlesim.engine.state.grid = false; particlesim.camera.turn(0.6, -0.2); }"
         )
         seen = pixels(page)
         camera = page.evaluate(
@@ -183,10 +183,10 @@ def test_frames_camera_slider_and_keys(show, server):
     assert (smaller[..., 2] - smaller[..., 0] > 60).mean() < 0.8 * blue
     # Space plays: frames follow each other, from the last to the first again.
     page.keyboard.press("Space")
-    page.wait_for_function("() => particlesim.state.index >= 3")
-    page.wait_for_function("() => particlesim.state.index < 3")
+    page.wait_for_function("() => particlesim.engine.state.index >= 3")
+    page.wait_for_function("() => particlesim.engine.state.index < 3")
     page.keyboard.press("Space")
-    assert not page.evaluate("() => particlesim.state.playing")
+    assert not page.evaluate("() => particlesim.engine.state.playing")
     assert page.locator("#error").is_hidden()
 
 
@@ -206,9 +206,9 @@ def test_worlds_colors_and_boundaries(show, server):
     ).sum() / 2
     page.locator("#canvas").focus()
     page.keyboard.press("ArrowDown")
-    page.wait_for_function("() => particlesim.state.world === 2")
+    page.wait_for_function("() => particlesim.engine.state.world === 2")
     page.keyboard.press("ArrowUp")
-    page.wait_for_function(f"() => particlesim.state.world === 1 && ({READY})()")
+    page.wait_for_function(f"() => particlesim.engine.state.world === 1 && ({READY})()")
     # By value: the legend has the range that the server says, which may be set.
     page.locator("#color").select_option("speed")
     page.wait_for_function(f"() => particlesim.frame.arrays['thing.ball_color'].count === {count}")
@@ -228,7 +228,7 @@ def test_worlds_colors_and_boundaries(show, server):
     looks = {}
     for way in ("solid", "edges", "none"):
         page.locator("#boundaries").select_option(way)
-        page.wait_for_function(f"() => particlesim.state.boundaries === '{way}'")
+        page.wait_for_function(f"() => particlesim.engine.state.boundaries === '{way}'")
         looks[way] = pixels(page)
     assert (looks["solid"] != looks["edges"]).any() and (looks["edges"] != looks["none"]).any()
     assert (looks["solid"] != looks["none"]).any(axis=-1).mean() > 0.02
@@ -276,14 +276,14 @@ def test_a_running_scene_plays_pauses_and_resets(show):
         with Server(running) as serving:
             page = show(serving, "")
             wait_frame(page, FRAMES)  # it starts by itself
-            page.wait_for_function("() => !particlesim.state.playing")
+            page.wait_for_function("() => !particlesim.engine.state.playing")
             end = pixels(page)
             page.keyboard.press("r")
             page.wait_for_function("() => particlesim.film.codes.length === 1")
             wait_frame(page, 0)
             assert running.done == 0 and (pixels(page) != end).any()
             page.keyboard.press("Space")
-            page.wait_for_function("() => particlesim.state.index >= 2")
+            page.wait_for_function("() => particlesim.engine.state.index >= 2")
             page.keyboard.press("Space")
             deadline = time.monotonic() + 10
             while running.playing and time.monotonic() < deadline:

@@ -9,10 +9,10 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from particlesim import verlet
-from particlesim.resume import checkpoint_path
-from particlesim.watchdog import audit
-from particlesim.watchdog.watch import Watchdog
+from particlesim.engine.neighbors import verlet
+from particlesim.instruments.watchdog import audit
+from particlesim.instruments.watchdog.watch import Watchdog
+from particlesim.simulation.resume import checkpoint_path
 
 G = 9.81
 
@@ -532,7 +532,7 @@ SMALL = {
 @pytest.mark.parametrize("name", ["dam_break", "star_collision", "gas_in_a_box", "triple_pendulum",
                                   "three_body", "pile", "chain", "spring_lattice"])  # fmt: skip
 def test_ready_scenes_raise_no_alarm(name, device, alarms):
-    from particlesim.scene_files import load_scene
+    from particlesim.commands.scene_files import load_scene
 
     module = load_scene(name)
     sim = ps.Simulation(module.build(**SMALL.get(name, {})), module.settings, device=device)

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from ..progress import Meter, bar
-from ..scene_files import label, load_scene
+from ..output.progress import Meter, bar
+from .scene_files import label, load_scene
 from .shell import (
     Debug,
     Device,
@@ -49,7 +49,7 @@ def tradeoff(
     """Measure what settings cost, and how accurate they are."""
     meter = Meter()
     with one_line_errors(meter, debug):
-        from ..tradeoff import command
+        from . import tradeoff as command
 
         command.check_outputs({"--plot": plot, "--save": save}, overwrite)
         if not debug:
@@ -82,7 +82,7 @@ def tune(
     """Find the cheapest settings under an error, and print them as Python."""
     meter = Meter()
     with one_line_errors(meter, debug):
-        from ..tune import command
+        from . import tune as command
 
         if not debug:
             start_warp_quietly()
@@ -106,7 +106,7 @@ def stress(
 ) -> None:
     """Run a scene at the extremes, and say where it held, refused, recovered or failed."""
     with one_line_errors(Meter(), debug):
-        from ..stress import command
+        from . import stress as command
 
         if not debug:
             start_warp_quietly()

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ..progress import Meter
-from ..scene_files import load_scene
+from ..output.progress import Meter
+from .scene_files import load_scene
 from .shell import (
     DEFAULT_FRAMES,
     Debug,
@@ -75,7 +75,7 @@ def render(
     """Draw a picture or a film of a recording, or a picture of a scene."""
     meter = Meter()
     with one_line_errors(meter, debug):
-        from ..render import command
+        from . import render as command
 
         request = command.Request(
             out, frame, frames, camera, color, color_map, color_range, width, height, ground, fps,
@@ -112,7 +112,7 @@ def view(
     The page is on this computer only.
     """
     with one_line_errors(Meter(), debug):
-        from ..view import command
+        from . import view as command
 
         def simulate() -> tuple[Any, int]:
             if not debug:
@@ -144,7 +144,7 @@ def plot(
 ) -> None:
     """Draw what a run recorded over time."""
     with one_line_errors(Meter(), debug):
-        from ..history.plots import plot_history
+        from ..output.history.plots import plot_history
 
         picture = file.with_suffix(".png") if out is None else out
         names = [word.strip() for word in what.split(",")] if what else None

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ..progress import Meter
-from ..scene_files import label, load_scene, ready_scenes
+from ..output.progress import Meter
+from .scene_files import label, load_scene, ready_scenes
 from .shell import (
     DEFAULT_FRAMES,
     Debug,

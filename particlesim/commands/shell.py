@@ -13,8 +13,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ..progress import Meter
-from ..scene_files import parse_options, split_options
+from ..output.progress import Meter
+from .scene_files import parse_options, split_options
 
 DEFAULT_FRAMES = 240
 PACKAGE = os.path.dirname(os.path.dirname(__file__))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..progress import Meter
+from ..output.progress import Meter
 from .shell import Debug, Overwrite, one_line_errors
 
 usd = typer.Typer(help="Look into USD files, check them, and pack them.", rich_markup_mode=None)
@@ -18,7 +18,7 @@ UsdFile = Annotated[Path, typer.Argument(metavar="FILE", help="A recording, or a
 def info(file: UsdFile, debug: Debug = False) -> None:
     """Show what is inside: the stage, its frames, what is drawn, and bytes."""
     with one_line_errors(Meter(), debug):
-        from ..usd_tools import command
+        from . import usd_files as command
 
         typer.echo(command.show(file))
 
@@ -30,7 +30,7 @@ def check(file: UsdFile, debug: Debug = False) -> None:
     Exit code 1: there are some.
     """
     with one_line_errors(Meter(), debug):
-        from ..usd_tools import command
+        from . import usd_files as command
 
         found = command.complaints(file)
         for line in found:
@@ -49,6 +49,6 @@ def pack(
 ) -> None:
     """Put a recording's frames into one file."""
     with one_line_errors(Meter(), debug):
-        from ..usd_tools import command
+        from . import usd_files as command
 
         typer.echo(command.packed(file, out, overwrite))

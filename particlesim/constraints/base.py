@@ -12,10 +12,11 @@ from ..interactions.base import Bindable
 if TYPE_CHECKING:
     import warp as wp
 
-    from ..model import Model
-    from ..neighbors import Neighbors
-    from ..stability import Limit, Probe
-    from ..state import State
+    from ..engine.model import Model
+    from ..engine.neighbors.lists import Neighbors
+    from ..engine.probing.probe import Probe
+    from ..engine.state import State
+    from ..instruments.stability.report import Limit
 
 
 class ConstraintBase(Bindable):

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import validate
-from ..kernels import boundary_shapes
+from ..kernels.constraints import boundary_shapes
 from .boundary_base import STILL, Boundary
 
 if TYPE_CHECKING:
-    from ..model import Model
-    from ..stability import Limit, Probe
+    from ..engine.model import Model
+    from ..engine.probing.probe import Probe
+    from ..instruments.stability.report import Limit
 
 
 class PlaneBoundary(Boundary):
@@ -155,7 +156,7 @@ class BoxBoundary(Boundary):
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the speed of the particles against the width; half spaces are never passed through."""
-        from ..stability.solids import box_limits
+        from .limits import box_limits
 
         return box_limits(self, probe)
 
@@ -228,7 +229,7 @@ class SphereBoundary(Boundary):
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the speed of the particles against the radius."""
-        from ..stability.solids import sphere_limits
+        from .limits import sphere_limits
 
         return sphere_limits(self, probe)
 

@@ -10,17 +10,17 @@ import numpy as np
 import warp as wp
 
 from .. import validate
-from ..kernels import boundary as kernels
-from ..kernels.boundary_shapes import Shape
-from ..kernels.rigid_motion import motion_type, pose_kernel, pose_type
-from ..launch import call, launch
+from ..engine.execution.launch import call, launch
+from ..kernels.constraints import boundary as kernels
+from ..kernels.constraints.boundary_shapes import Shape
+from ..kernels.constraints.rigid_motion import motion_type, pose_kernel, pose_type
 from .easing import EasedConstraint, Easing
 from .tuples import bodies
 
 if TYPE_CHECKING:
-    from ..model import Model
-    from ..neighbors import Neighbors
-    from ..state import State
+    from ..engine.model import Model
+    from ..engine.neighbors.lists import Neighbors
+    from ..engine.state import State
 
 STILL = (0.0, 0.0, 0.0)
 

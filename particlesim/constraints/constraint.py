@@ -9,18 +9,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from .. import topology, validate
+from .. import validate
+from ..engine import topology
+from ..engine.execution.launch import launch
 from ..interactions.pair import as_law
-from ..kernels import constraints as kernels
-from ..launch import launch
+from ..kernels.constraints import constraints as kernels
 from .base import ConstraintBase
 from .tuples import Tuples, bodies
 
 if TYPE_CHECKING:
-    from ..model import Model
-    from ..neighbors import Neighbors
-    from ..stability import Limit, Probe
-    from ..state import State
+    from ..engine.model import Model
+    from ..engine.neighbors.lists import Neighbors
+    from ..engine.probing.probe import Probe
+    from ..engine.state import State
+    from ..instruments.stability.report import Limit
     from .force import ConstraintForce
 
 OWN = ("compliance", "damping", "break_force")  # parameters of every constraint
@@ -231,7 +233,7 @@ class Constraint(ConstraintBase):
 
     def limits(self, probe: Probe) -> list[Limit]:
         """None, as XPBD is implicit; how fast it damps is told."""
-        from ..stability.solids import constraint_limits
+        from .limits import constraint_limits
 
         return constraint_limits(self, probe)
 

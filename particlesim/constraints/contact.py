@@ -9,19 +9,20 @@ import numpy as np
 import warp as wp
 
 from .. import validate
-from ..kernels import contact as kernels
-from ..kernels import contact_terms as terms
-from ..kernels.constraints import bodies_type
-from ..kernels.pair import pair_kernel
-from ..launch import call, launch, when
+from ..engine.execution.launch import call, launch, when
+from ..kernels.constraints import contact as kernels
+from ..kernels.constraints import contact_terms as terms
+from ..kernels.constraints.constraints import bodies_type
+from ..kernels.interactions.pair import pair_kernel
 from .easing import EasedConstraint, Easing
 from .tuples import bodies
 
 if TYPE_CHECKING:
-    from ..model import Model
-    from ..neighbors import Neighbors
-    from ..stability import Limit, Probe
-    from ..state import State
+    from ..engine.model import Model
+    from ..engine.neighbors.lists import Neighbors
+    from ..engine.probing.probe import Probe
+    from ..engine.state import State
+    from ..instruments.stability.report import Limit
 
 CLOSEST = 1e-9  # parts of the cutoff: closer than this, particles count as coincident
 
@@ -249,6 +250,6 @@ class Contact(EasedConstraint):
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the speed of the particles against their radius."""
-        from ..stability.solids import contact_limits
+        from .limits import contact_limits
 
         return contact_limits(self, probe)

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from .. import topology, validate
-from ..kernels.constraints import distance_evaluation
-from ..law import law
+from .. import validate
+from ..engine import topology
+from ..kernels.constraints.constraints import distance_evaluation
+from ..scene.law import law
 from .constraint import Constraint
 
 if TYPE_CHECKING:
-    from ..model import Model
+    from ..engine.model import Model
 
 
 @law

@@ -7,8 +7,8 @@ from typing import Any
 
 import warp as wp
 
-from ..kernels.easing import easing_type
-from ..model import Model
+from ..engine.model import Model
+from ..kernels.constraints.easing import easing_type
 from .base import ConstraintBase
 
 FRAMES = 30.0  # in which slack falls to 1/e, where the depenetration speed allows

@@ -8,15 +8,15 @@ import numpy as np
 import warp as wp
 
 from .. import validate
+from ..engine.execution.launch import launch
 from ..interactions.base import Interaction
-from ..kernels import constraint_force as kernels
-from ..launch import launch
+from ..kernels.constraints import constraint_force as kernels
 from .tuples import Tuples, bodies
 
 if TYPE_CHECKING:
-    from ..model import Model
-    from ..neighbors import Neighbors
-    from ..state import State
+    from ..engine.model import Model
+    from ..engine.neighbors.lists import Neighbors
+    from ..engine.state import State
     from .constraint import Constraint
 
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from .. import topology
-from ..kernels.constraints import bodies_type, tuples_type
-from ..model import Model
-from ..state import State
+from ..engine import topology
+from ..engine.model import Model
+from ..engine.state import State
+from ..kernels.constraints.constraints import bodies_type, tuples_type
 
 
 class Tuples:

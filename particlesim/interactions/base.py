@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import validate
-from ..law import Law
+from ..scene.law import Law
 
 if TYPE_CHECKING:
     import warp as wp
 
-    from ..model import Model
-    from ..neighbors import Neighbors
-    from ..stability import Limit, Probe
-    from ..state import State
+    from ..engine.model import Model
+    from ..engine.neighbors.lists import Neighbors
+    from ..engine.probing.probe import Probe
+    from ..engine.state import State
+    from ..instruments.stability.report import Limit
 
 # Per-particle quantities that a law may name, beside the attributes of the scene.
 QUANTITIES = frozenset({"position", "velocity", "mass", "radius", "density"})

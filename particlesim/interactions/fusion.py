@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from ..kernels import pair as kernels
+from ..engine.execution.launch import launch
+from ..kernels.interactions import pair as kernels
 from ..kernels.precision import Precision, structure
-from ..launch import launch
 from .base import Interaction
 from .pair import Pair, filled
 
 if TYPE_CHECKING:
-    from ..neighbors import Neighbors
-    from ..state import State
+    from ..engine.neighbors.lists import Neighbors
+    from ..engine.state import State
 
 
 class FusedPairs(Interaction):

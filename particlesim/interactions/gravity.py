@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import warp as wp
 
 from .. import validate
-from ..law import law
+from ..scene.law import law
 from .pair import Pair
 
 if TYPE_CHECKING:
-    from ..stability import Limit, Probe
+    from ..engine.probing.probe import Probe
+    from ..instruments.stability.report import Limit
 
 
 @law
@@ -51,8 +52,8 @@ class Gravity(Pair):
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the tide now, by orbits' pericentres, and by passages at the softening length."""
-        from ..stability.orbits import closest_approach
-        from ..stability.pairs import closest_passage
+        from .orbit_limits import closest_approach
+        from .pair_limits import closest_passage
 
         limits = probe.response(self) + closest_passage(self, probe)
         return limits + closest_approach(self, probe)

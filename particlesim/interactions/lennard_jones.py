@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import validate
-from ..law import Law, law
+from ..scene.law import Law, law
 from .pair import Pair
 
 TRUNCATIONS = ("cut", "shift", "force_shift")

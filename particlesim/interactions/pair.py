@@ -8,19 +8,20 @@ import numpy as np
 import warp as wp
 
 from .. import validate
-from ..kernels import pair as kernels
+from ..engine.execution.launch import launch
+from ..kernels.interactions import pair as kernels
 from ..kernels.precision import structure
-from ..launch import launch
-from ..law import Law
-from ..law import law as make_law
+from ..scene.law import Law
+from ..scene.law import law as make_law
 from .base import Arguments, Interaction
 
 if TYPE_CHECKING:
-    from ..all_pairs import AllPairs
-    from ..model import Model
-    from ..neighbors import Neighbors
-    from ..stability import Limit, Probe
-    from ..state import State
+    from ..engine.model import Model
+    from ..engine.neighbors.all_pairs import AllPairs
+    from ..engine.neighbors.lists import Neighbors
+    from ..engine.probing.probe import Probe
+    from ..engine.state import State
+    from ..instruments.stability.report import Limit
 
 # Closer than this, particles count as coincident: in parts of the cutoff, and without a cutoff.
 COINCIDENT, CLOSEST = 1e-6, 1e-12
@@ -155,7 +156,7 @@ class Pair(Interaction):
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the gradient at the present distances and, within a cutoff, at those to come."""
-        from ..stability.pairs import collisions
+        from .pair_limits import collisions
 
         return probe.response(self) + ([] if self.cutoff is None else collisions(self, probe))
 
@@ -178,7 +179,7 @@ class PairPotential(Pair):
     """Pair force from an energy law: f = -du/dr, derived by ``wp.grad`` inside the kernel.
 
     Args:
-        law: ``u(r, ...)`` [energy]; made by :func:`particlesim.law` or a plain function.
+        law: ``u(r, ...)`` [energy]; made by :func:`particlesim.scene.law` or a plain function.
         group: Which particles interact with each other; None: all.
         cutoff: Distance beyond which there is no force [length]; None: all pairs of a world.
         **parameters: The law's further parameters; those not given are quantities of the two

@@ -9,16 +9,16 @@ import numpy as np
 import warp as wp
 
 from .. import validate
-from ..kernels import particle as kernels
-from ..launch import launch
-from ..law import Law, law
+from ..engine.execution.launch import launch
+from ..kernels.interactions import particle as kernels
+from ..scene.law import Law, law
 from .base import Arguments, Interaction
 from .pair import as_law, filled, structure_of
 
 if TYPE_CHECKING:
-    from ..model import Model
-    from ..neighbors import Neighbors
-    from ..state import State
+    from ..engine.model import Model
+    from ..engine.neighbors.lists import Neighbors
+    from ..engine.state import State
 
 
 class ParticleForce(Interaction):

@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from .. import topology
-from ..kernels import bonded as kernels
-from ..launch import launch
+from ..engine import topology
+from ..engine.execution.launch import launch
+from ..kernels.interactions import bonded as kernels
 from .base import Interaction
 
 if TYPE_CHECKING:
-    from ..model import Model
-    from ..neighbors import Neighbors
-    from ..stability import Limit, Probe
-    from ..state import State
+    from ..engine.model import Model
+    from ..engine.neighbors.lists import Neighbors
+    from ..engine.probing.probe import Probe
+    from ..engine.state import State
+    from ..instruments.stability.report import Limit
 
 
 class Springs(Interaction):
@@ -88,7 +89,7 @@ class Springs(Interaction):
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the gradient of the force, and at most the bound of Anderson and Morley."""
-        from ..stability.bonds import spring_bound
+        from .spring_limits import spring_bound
 
         if not self.count:
             return []

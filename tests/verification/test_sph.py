@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from particlesim.interactions.smoothing import SMOOTHING
+from particlesim.interactions.fluid.smoothing import SMOOTHING
 
 
 @ps.law

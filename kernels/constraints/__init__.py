@@ -1,0 +1,1 @@
+"""Kernels of XPBD constraints: tuples, contacts, boundaries, and what they share."""

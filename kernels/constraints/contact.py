@@ -1,0 +1,161 @@
+"""Contacts of particles: the copies that their pair passes read, and the overlap of a start."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
+from ..precision import Precision, register, structure
+from .constraints import bodies_type
+from .easing import ease_function, easing_type
+
+
+@functools.cache
+def contact_types(precision: Precision) -> tuple[Any, Any]:
+    """Slot-ordered copies, and what the count of contacts writes."""
+    vec3, real = precision.vec3, precision.scalar
+    data = {
+        "x": wp.array(dtype=vec3),
+        "radius": wp.array(dtype=real),  # less the slack
+        "share": wp.array(dtype=real),  # w times the ways that normals are split
+        "grip": wp.array(dtype=real),  # w times the ways that friction is split
+        "way": wp.array(dtype=vec3),  # of this substep; for bounces the velocity that it began with
+        "v": wp.array(dtype=vec3),  # for bounces
+        "inverse_dt_squared": real,
+    }
+    shares = {
+        "share": wp.array(dtype=real),
+        "grip": wp.array(dtype=real),
+        "w": wp.array(dtype=real),
+        "relaxation": real,
+    }
+    return (
+        structure(f"ContactData_{precision.name}", data),
+        structure(f"ContactShares_{precision.name}", shares),
+    )
+
+
+@functools.cache
+def slack_kernels(precision: Precision, periodic: Periodicity) -> tuple[wp.Kernel, wp.Kernel]:
+    """Kernels: the slack that leaves no pair overlapping, of marked worlds; and its running out.
+
+    A particle's radius shrinks by the factor r / (R_i + R_j) of its worst pair: no two overlap
+    then, since neither factor is larger than that of their own pair.
+    """
+    real, Box = precision.scalar, box_type(precision)
+    Bodies, Easing = bodies_type(precision), easing_type(precision)
+    image, ease = minimum_image(precision, periodic), ease_function(precision)
+
+    @register
+    def measure_slack(
+        first: int,
+        pairs: Pairs,
+        box: wp.array(dtype=Box),
+        marked: wp.array(dtype=wp.int32),
+        b: Bodies,
+        radius: wp.array(dtype=real),
+        dt: real,
+        slack_out: wp.array(dtype=real),
+    ):
+        s = first + wp.tid()
+        world = pairs.world[s]
+        if marked[world] == 0:
+            return
+        i = pairs.order[s]
+        x_i = b.x[i] - b.v[i] * dt  # where the substep began: the way since is no overlap
+        factor = real(1.0)
+        row = wp.int64(s) * pairs.row_stride
+        for k in range(wp.min(pairs.count[s], pairs.capacity)):
+            j = pairs.order[pairs.index[row + wp.int64(k) * pairs.entry_stride]]
+            reach = radius[i] + radius[j]
+            r = wp.length(image(x_i - (b.x[j] - b.v[j] * dt), box[world]))
+            if r < factor * reach and b.w[i] + b.w[j] > real(0.0):
+                factor = r / reach
+        slack_out[i] = radius[i] * (real(1.0) - factor)
+
+    @register
+    def run_out(
+        first: int,
+        pairs: Pairs,
+        radius: wp.array(dtype=real),
+        easing: Easing,
+        dt: real,
+        slack_io: wp.array(dtype=real),
+    ):
+        i = pairs.order[first + wp.tid()]
+        if slack_io[i] > real(0.0):
+            slack_io[i] = ease(slack_io[i], radius[i], dt, easing)
+
+    return measure_slack, run_out
+
+
+@functools.cache
+def gather_kernel(precision: Precision, compensated: bool) -> wp.Kernel:
+    """Kernel: positions, radii and ways into slot order.
+
+    With compensated sums the positions are taken from a particle of the same world: differences
+    far from the origin are then as exact as near to it.
+    """
+    real = precision.scalar
+    Bodies, (Data, _) = bodies_type(precision), contact_types(precision)
+
+    @register
+    def gather_contacts(
+        first: int,
+        pairs: Pairs,
+        b: Bodies,
+        radius: wp.array(dtype=real),
+        slack: wp.array(dtype=real),
+        eased: real,
+        dt: real,
+        follow: real,
+        d_out: Data,
+    ):
+        s = first + wp.tid()
+        i = pairs.order[s]
+        x = b.x[i]
+        if wp.static(compensated):
+            o = pairs.order[pairs.begin[pairs.world[s]]]
+            x = (x - b.x[o]) + (b.x_error[i] - b.x_error[o])
+        d_out.x[s] = x
+        d_out.radius[s] = radius[i] - eased * slack[i]
+        d_out.way[s] = b.v[i] * dt + b.correction[i] * follow
+
+    return gather_contacts
+
+
+@functools.cache
+def gather_bounce_kernel(precision: Precision, compensated: bool, forces: bool) -> wp.Kernel:
+    """Kernel: for a bounce, positions after integration and velocities as the substep began."""
+    vec3, real = precision.vec3, precision.scalar
+    Bodies, (Data, _) = bodies_type(precision), contact_types(precision)
+
+    @register
+    def gather_bounces(
+        first: int,
+        pairs: Pairs,
+        b: Bodies,
+        f: wp.array(dtype=vec3),
+        radius: wp.array(dtype=real),
+        slack: wp.array(dtype=real),
+        dt: real,
+        inverse_dt: real,
+        d_out: Data,
+    ):
+        s = first + wp.tid()
+        i = pairs.order[s]
+        x = b.x[i] - b.correction[i]
+        if wp.static(compensated):
+            o = pairs.order[pairs.begin[pairs.world[s]]]
+            x = (b.x[i] - b.x[o]) + (b.x_error[i] - b.x_error[o]) - b.correction[i]
+        d_out.x[s] = x
+        d_out.radius[s] = radius[i] - slack[i]
+        v = b.v[i]
+        d_out.v[s] = v
+        v = v - b.correction[i] * inverse_dt
+        if wp.static(forces):
+            v = v - f[i] * (b.w[i] * dt)
+        d_out.way[s] = v
+
+    return gather_bounces

@@ -1,0 +1,228 @@
+"""Contacts of particles: what pairs add, and what is made of the sums.
+
+The pair passes read copies in slot order and write the state: Jacobi, whatever the order of the
+threads. Averaging is by mass splitting (Tonge, Benevolenski and Voroshilov 2012): a particle with
+n contacts counts as n times as light in each, which keeps corrections opposite and equal. Instead
+of n, the largest eigenvalue of the sum of n n^T over the normals is enough for corrections that
+never overshoot (the sum of lam n is then bounded by what is split); it is n for contacts in a line
+and n/3 for contacts all around.
+"""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from ..engine.loops import reader
+from ..precision import Precision, function
+from .constraints import bodies_type, place_function, rounding_function
+from .contact import contact_types
+
+
+@functools.cache
+def _separation_function(precision: Precision) -> wp.Function:
+    """Distance and direction of a pair, also of a coincident one, without a branch.
+
+    Coincident particles get one of eight directions by the difference of their slots: opposite for
+    the two, the same in a batch as alone, and not all in one line.
+    """
+    vec3, real = precision.vec3, precision.scalar
+
+    def separation(i: int, j: int, x_ij: vec3, r2: real, closest_squared: real):
+        apart = r2 > closest_squared
+        r = wp.sqrt(wp.where(apart, r2, closest_squared))
+        k = wp.abs(i - j)
+        side = wp.where(apart, real(0.0), wp.where(i < j, real(-1.0), real(1.0)))
+        a = wp.where((k & 1) == 0, real(0.48), real(-0.48))
+        b = wp.where((k & 2) == 0, real(0.6), real(-0.6))
+        c = wp.where((k & 4) == 0, real(0.64), real(-0.64))
+        n = x_ij * (wp.where(apart, real(1.0), real(0.0)) / r) + vec3(a, b, c) * side
+        return r, n
+
+    return function(separation)
+
+
+@functools.cache
+def _of_pairs(precision: Precision) -> tuple[wp.Function, wp.Function, wp.Function]:
+    """What terms take of a pair: ``separation`` as above; ``both(a, i, j)``, the sum of the two's
+    numbers in an array, and ``between(a, i, j)``, the difference of their vectors.
+    """
+    real, vec3 = precision.scalar, precision.vec3
+    number, vector = reader(precision), reader(precision, 3)
+
+    def both(a: wp.array(dtype=real), i: int, j: int):
+        return number(a, i) + number(a, j)
+
+    def between(a: wp.array(dtype=vec3), i: int, j: int):
+        return vector(a, i) - vector(a, j)
+
+    return _separation_function(precision), function(both), function(between)
+
+
+@functools.cache
+def crowding_term(precision: Precision, params: Any, bounce: bool) -> wp.Function:
+    """Term: n n^T of a pair in contact, as its six entries; bounce: that approached at first."""
+    vec3, real, six = precision.vec3, precision.scalar, precision.vector(6)
+    (Data, _), (separation, both, between) = contact_types(precision), _of_pairs(precision)
+
+    def crowding(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
+        r, n = separation(i, j, x_ij, r2, p.closest_squared)
+        weight = wp.where(r < both(d.radius, i, j), real(1.0), real(0.0))
+        if wp.static(bounce):
+            approach = wp.dot(n, between(d.way, i, j))
+            weight = wp.where(approach < real(0.0), weight, real(0.0))
+        m = n * weight
+        return six(m[0] * n[0], m[0] * n[1], m[0] * n[2], m[1] * n[1], m[1] * n[2], m[2] * n[2])
+
+    return function(crowding)
+
+
+@functools.cache
+def largest_eigenvalue(precision: Precision) -> wp.Function:
+    """An upper bound of the largest eigenvalue of a positive symmetric matrix of six entries.
+
+    (sum lambda^8)^(1/8), by squaring twice: exact for one direction, at most 15 % too much.
+    """
+    real, six = precision.scalar, precision.vector(6)
+
+    def squared(t: six):
+        return six(
+            t[0] * t[0] + t[1] * t[1] + t[2] * t[2],
+            t[0] * t[1] + t[1] * t[3] + t[2] * t[4],
+            t[0] * t[2] + t[1] * t[4] + t[2] * t[5],
+            t[1] * t[1] + t[3] * t[3] + t[4] * t[4],
+            t[1] * t[2] + t[3] * t[4] + t[4] * t[5],
+            t[2] * t[2] + t[4] * t[4] + t[5] * t[5],
+        )
+
+    square = function(squared)
+
+    def bound(t: six):
+        trace = t[0] + t[3] + t[5]
+        result = trace
+        if trace > real(0.0):
+            q = square(square(t / trace))
+            off = q[1] * q[1] + q[2] * q[2] + q[4] * q[4]
+            norm = q[0] * q[0] + q[3] * q[3] + q[5] * q[5] + real(2.0) * off
+            result = trace * wp.sqrt(wp.sqrt(wp.sqrt(norm)))
+        return result
+
+    return function(bound)
+
+
+@functools.cache
+def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Function:
+    """Term: multiplier times direction of a pair's correction.
+
+    lam = (R_i + R_j - r) / (c_i w_i + c_j w_j + alpha~) along the normal, c the crowding; friction
+    takes back the tangential way of the substep, split among the contacts too, with at most
+    mu lam (Macklin et al. 2014, eq. 24).
+    """
+    vec3, real = precision.vec3, precision.scalar
+    (Data, _), (separation, both, between) = contact_types(precision), _of_pairs(precision)
+
+    def push(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
+        r, n = separation(i, j, x_ij, r2, p.closest_squared)
+        reach = both(d.radius, i, j)
+        touching = r < reach
+        u = between(d.way, i, j)
+        # A pair that has passed through each other goes back the way it came.
+        y = x_ij - u
+        y2 = wp.dot(y, y)
+        through = wp.dot(y, x_ij) < real(0.0) and y2 > p.closest_squared
+        turned = wp.where(through, real(1.0), real(0.0))
+        n = n * (real(1.0) - turned) + y * (turned / wp.sqrt(wp.where(through, y2, real(1.0))))
+        r = wp.where(through, wp.dot(n, x_ij), r)
+        share = both(d.share, i, j)
+        soft = share + p.compliance * d.inverse_dt_squared
+        active = touching and share > real(0.0)
+        lam = wp.where(active, reach - r, real(0.0)) / wp.where(active, soft, real(1.0))
+        result = n * lam
+        if wp.static(friction):
+            t = u - n * wp.dot(u, n)
+            length = wp.sqrt(wp.dot(t, t))
+            split = wp.max(both(d.grip, i, j), real(1.0e-30))
+            limit = p.friction * lam / wp.max(length, real(1.0e-30))
+            result = result - t * wp.min(real(1.0) / split, limit)
+        return result
+
+    return function(push)
+
+
+@functools.cache
+def bounce_term(precision: Precision, params: Any) -> wp.Function:
+    """Term: impulse that sends a pair off at e times the speed it approached with.
+
+    Mueller et al. (2020), eq. 34; the speed is that before the forces of the substep, so that
+    what rests under gravity does not bounce.
+    """
+    vec3, real = precision.vec3, precision.scalar
+    (Data, _), (separation, both, between) = contact_types(precision), _of_pairs(precision)
+
+    def bounce(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
+        _r, n = separation(i, j, x_ij, r2, p.closest_squared)
+        reach = both(d.radius, i, j)
+        share = both(d.share, i, j)
+        before = wp.dot(between(d.way, i, j), n)
+        missing = -p.restitution * before - wp.dot(between(d.v, i, j), n)
+        touching = r2 < reach * reach and share > real(0.0)
+        hit = touching and before < real(0.0) and missing > real(0.0)
+        return n * (wp.where(hit, missing, real(0.0)) / wp.where(hit, share, real(1.0)))
+
+    return function(bounce)
+
+
+@functools.cache
+def store_share(precision: Precision, params: Any) -> wp.Function:
+    """Store: w times the ways in which normals are split, and friction.
+
+    Energy cannot grow if in no direction more than the whole of an error is taken back, for a
+    share of crowding / split_normal by normals and (n - crowding) / split_friction by friction.
+    Without friction that is split_normal = crowding. With friction and a = 1 - crowding / n, 0 for
+    contacts in a line and 2/3 all around, split_friction = n / (1 - 3/4 a) leaves normals
+    crowding / (1 - a + 3/4 a^2): exact for contacts in a line, even-handed all around.
+    """
+    real, six = precision.scalar, precision.vector(6)
+    Data, Shares = contact_types(precision)
+    eigenvalue = largest_eigenvalue(precision)
+
+    def keep_share(i: int, particle: int, total: six, d: Data, p: params, o: Shares):
+        w = o.w[particle] / o.relaxation
+        crowding = eigenvalue(total)
+        split = crowding
+        if p.friction > real(0.0):
+            n = total[0] + total[3] + total[5]
+            a = real(1.0) - crowding / wp.max(n, real(1.0))
+            ease = real(0.75) * a
+            split = crowding / (real(1.0) - a + a * ease)
+            o.grip[i] = w * n / (real(1.0) - ease)
+        o.share[i] = w * split
+
+    return function(keep_share)
+
+
+@functools.cache
+def store_correction(precision: Precision, params: Any, compensated: bool) -> wp.Function:
+    """Store: x += w sum, and the same into the correction."""
+    vec3, real = precision.vec3, precision.scalar
+    (Data, _), Bodies = contact_types(precision), bodies_type(precision)
+    kept, place = rounding_function(precision, compensated), place_function(precision, compensated)
+
+    def correct(i: int, particle: int, total: vec3, d: Data, p: params, o: Bodies):
+        touched = total[0] != real(0.0) or total[1] != real(0.0) or total[2] != real(0.0)
+        if touched:
+            place(particle, o.x[particle], kept(particle, o), total * o.w[particle], o)
+
+    return function(correct)
+
+
+@functools.cache
+def store_impulse(precision: Precision, params: Any) -> wp.Function:
+    """Store: v += w sum."""
+    vec3 = precision.vec3
+    (Data, _), Bodies = contact_types(precision), bodies_type(precision)
+
+    def kick(i: int, particle: int, total: vec3, d: Data, p: params, o: Bodies):
+        o.v[particle] = o.v[particle] + total * o.w[particle]
+
+    return function(kick)

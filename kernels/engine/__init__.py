@@ -1,0 +1,1 @@
+"""Kernels that every scene runs: integration, neighbour lists, loops over them, copies, sums."""

@@ -1,0 +1,98 @@
+"""By how much constraints are missed at the present positions."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from ..constraints.boundary import held_type, meeting_function
+from ..constraints.boundary_shapes import Shape
+from ..constraints.constraints import bodies_type, rounding_function, tuples_type, view_function
+from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
+from ..precision import Precision, register
+
+
+@functools.cache
+def tuples_kernel(
+    evaluate: wp.Function, precision: Precision, periodic: Periodicity, compensated: bool,
+    size: int, item: Any, relative: bool,
+) -> wp.Kernel:  # fmt: skip
+    """Kernel: C of each tuple; of an inequality what is below 0, of a broken one nothing."""
+    real, Box = precision.scalar, box_type(precision)
+    Bodies, Tuples = bodies_type(precision), tuples_type(precision, size, item)
+    view = view_function(evaluate, precision, periodic, compensated, size, item, relative)
+
+    @register
+    def miss_tuples(
+        first: int,
+        box: wp.array(dtype=Box),
+        t: Tuples,
+        b: Bodies,
+        miss_out: wp.array(dtype=real),
+    ):
+        r = first + wp.tid()
+        _x, _e, _X, C, _G = view(r, box, t, b)
+        if t.one_sided != 0:
+            C = wp.min(C, real(0.0))
+        if t.breakable != 0:
+            if t.broken[r] != 0:
+                C = real(0.0)
+        miss_out[r] = C
+
+    return miss_tuples
+
+
+@functools.cache
+def boundary_kernel(
+    shape: Shape, precision: Precision, params: Any, compensated: bool, moving: bool
+) -> wp.Kernel:
+    """Kernel: how deep each particle is inside of a boundary, on its worst side."""
+    real, each = precision.scalar, shape.each(precision)
+    Bodies, Held = bodies_type(precision), held_type(precision, shape)
+    meet = meeting_function(shape, precision, params, moving)
+    kept = rounding_function(precision, compensated)
+
+    @register
+    def miss_boundary(
+        first: int,
+        parameters: wp.array(dtype=params),
+        h: Held,
+        b: Bodies,
+        miss_out: wp.array(dtype=real),
+    ):
+        k = first + wp.tid()
+        i = h.particle[k]
+        w = h.world[k]
+        back, _N = meet(i, w, b.x[i], kept(i, b), each(), parameters[w], h)
+        miss_out[k] = wp.max(back)
+
+    return miss_boundary
+
+
+@functools.cache
+def contact_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
+    """Kernel: R_i + R_j - r of each particle's deepest overlap, by slot; 0 without any."""
+    real, Box, Bodies = precision.scalar, box_type(precision), bodies_type(precision)
+    image = minimum_image(precision, periodic)
+
+    @register
+    def miss_contacts(
+        first: int,
+        pairs: Pairs,
+        box: wp.array(dtype=Box),
+        b: Bodies,
+        radius: wp.array(dtype=real),
+        miss_out: wp.array(dtype=real),
+    ):
+        s = first + wp.tid()
+        i = pairs.order[s]
+        deepest = real(0.0)
+        row = wp.int64(s) * pairs.row_stride
+        for k in range(wp.min(pairs.count[s], pairs.capacity)):
+            j = pairs.order[pairs.index[row + wp.int64(k) * pairs.entry_stride]]
+            r = wp.length(image(b.x[i] - b.x[j], box[pairs.world[s]]))
+            if b.w[i] + b.w[j] > real(0.0):
+                deepest = wp.max(deepest, radius[i] + radius[j] - r)
+        miss_out[s] = deepest
+
+    return miss_contacts

@@ -1,0 +1,1 @@
+"""Kernels of forces: pairs, particles, bonds and fluids."""

@@ -1,0 +1,163 @@
+"""Pair interactions: terms made of laws, and the kernels that sum them over the partners."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from ..engine.loops import Pairs, Periodicity, box_type, native_loop, plain_loop
+from ..precision import Precision, function, function_from_source, register
+
+# A pair closer than p.closest is taken as that far apart, along a fixed direction: coincident
+# particles then push each other apart, equally and opposite.
+_SEPARATION = """
+    near = p.closest_squared
+    side = wp.where(i < j, real(-1.0), real(1.0))
+    apart = r2 > near
+    r = wp.where(apart, wp.sqrt(r2), wp.sqrt(near))
+    along = x_ij + vec3(real(0.48), real(0.6), real(0.64)) * wp.where(apart, real(0.0), side * r)
+"""
+
+
+def force_term(
+    law: wp.Function, arguments: list[str], derivative: bool, precision: Precision,
+    data: Any, params: Any,
+) -> wp.Function:  # fmt: skip
+    """Term f_ij = F(r) x_ij / r, with F the law itself or minus the derivative of an energy.
+
+    ``arguments`` are the source of the law's arguments after ``r``, in terms of i, j, d and p.
+    """
+    call = ", ".join(["r", *arguments])
+    if derivative:
+        names = [f"g{k}" for k in range(len(arguments) + 1)]
+        evaluate = f"    {', '.join(names)} = wp.grad(law)({call})\n    f = -g0"
+    else:
+        evaluate = f"    f = law({call})"
+    return _term("pair_force", evaluate, "along * (f / r)", law, precision, data, params, "vec3")
+
+
+def measure_term(
+    energy: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any
+) -> wp.Function:
+    """Term (u_ij / 2, w_ij / 2) of the potential energy and of the virial w = -r du/dr."""
+    call = ", ".join(["r", *arguments])
+    names = [f"g{k}" for k in range(len(arguments) + 1)]
+    evaluate = (
+        f"    {', '.join(names)} = wp.grad(law)({call})\n    u = law({call})\n    half = real(0.5)"
+    )
+    return _term(
+        "pair_measure", evaluate, "pair2(half * u, -half * r * g0)", energy, precision, data,
+        params, "pair2",
+    )  # fmt: skip
+
+
+def _term(
+    name: str, evaluate: str, result: str, law: wp.Function, precision: Precision, data: Any,
+    params: Any, returns: str,
+) -> wp.Function:  # fmt: skip
+    source = (
+        f"def {name}(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: Params):"
+        f"{_SEPARATION}{evaluate}\n    return {result}\n"
+    )
+    namespace = {
+        "wp": wp, "law": law, "real": precision.scalar, "vec3": precision.vec3,
+        "pair2": precision.vector(2), "Data": data, "Params": params,
+    }  # fmt: skip
+    return function_from_source(source, namespace)
+
+
+def fused_term(
+    terms: list[wp.Function], precision: Precision, data: Any, params: Any
+) -> wp.Function:
+    """Sum of several terms of forces, each within its own cutoff, with its own data and parameters.
+
+    Beyond its own cutoff a term is evaluated inside it and multiplied away, so that the loop has
+    no branch and a law is never asked where it need not be defined.
+    """
+    lines = ["def fused_force(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: Params):"]
+    for k in range(len(terms)):
+        lines += [
+            f"    c{k} = p.part_{k}.cutoff_squared",
+            f"    on{k} = r2 < c{k}",
+            f"    at{k} = wp.where(on{k}, r2, real(0.5) * c{k})",
+            f"    f{k} = term_{k}(i, j, x_ij, at{k}, d.part_{k}, p.part_{k})",
+            f"    w{k} = wp.where(on{k}, real(1.0), real(0.0))",
+        ]
+    lines.append("    return " + " + ".join(f"w{k} * f{k}" for k in range(len(terms))))
+    namespace = {
+        "wp": wp, "real": precision.scalar, "vec3": precision.vec3, "Data": data, "Params": params,
+        **{f"term_{k}": term for k, term in enumerate(terms)},
+    }  # fmt: skip
+    result = function_from_source("\n".join(lines) + "\n", namespace)
+    # Emitted behind the terms, which may themselves stand behind the adjoints they call.
+    result.adj.uses_grad_call = True
+    return result
+
+
+def pair_kernel(
+    term: wp.Function, store: wp.Function, data: Any, params: Any, out: Any, width: int,
+    precision: Precision, periodic: Periodicity, partners: str, vectorised: bool,
+) -> wp.Kernel:  # fmt: skip
+    """Kernel: for every slot, sum ``term`` over its partners and hand the sum to ``store``.
+
+    ``store(i, particle, total, d, p, o)`` writes row i of the outputs in slot order, or row
+    ``particle`` of the state's.
+    """
+    key = (
+        term.native_func, store.native_func, width, precision.name, tuple(periodic), partners,
+        vectorised,
+    )  # fmt: skip
+    if key not in _KERNELS:
+        make = native_loop if vectorised else plain_loop
+        loop = make(term, data, params, width, precision, periodic, partners)
+        _KERNELS[key] = _pair_kernel(loop, term, store, data, params, out, precision, vectorised)
+    return _KERNELS[key]
+
+
+_KERNELS: dict[tuple, wp.Kernel] = {}
+
+
+def _pair_kernel(loop, term, store, data, params, out, precision, vectorised) -> wp.Kernel:
+    Box, real, vec3 = box_type(precision), precision.scalar, precision.vec3
+
+    @functools.partial(register, cpu_only=vectorised)
+    def sum_over_partners(
+        first: int,
+        pairs: Pairs,
+        box: wp.array(dtype=Box),
+        parameters: wp.array(dtype=params),
+        d: data,
+        o: out,
+    ):
+        i = first + wp.tid()
+        w = pairs.world[i]
+        p = parameters[w]
+        if wp.static(vectorised):
+            # The native loop calls the term by name: this has Warp emit the term before it.
+            unused = term(i, i, vec3(), real(1.0), d, p)  # noqa: F841
+        store(i, pairs.order[i], loop(i, pairs, box[w], d, p), d, p, o)
+
+    return sum_over_partners
+
+
+@functools.cache
+def add_force(precision: Precision, data: Any, params: Any, out: Any) -> wp.Function:
+    """Store: f += sum."""
+    vec3 = precision.vec3
+
+    def add_to_force(i: int, particle: int, total: vec3, d: data, p: params, o: out):
+        o.f[particle] = o.f[particle] + total
+
+    return function(add_to_force)
+
+
+@functools.cache
+def store_measure(precision: Precision, data: Any, params: Any, out: Any) -> wp.Function:
+    """Store: the particle's share of energy and virial."""
+    pair2 = precision.vector(2)
+
+    def keep_measure(i: int, particle: int, total: pair2, d: data, p: params, o: out):
+        o.energy[particle] = o.energy[particle] + wp.float64(total[0])
+        o.virial[particle] = o.virial[particle] + wp.float64(total[1])
+
+    return function(keep_measure)

@@ -1,0 +1,192 @@
+"""Smoothed particle hydrodynamics: terms of pairs, what is kept of their sums, interpolation.
+
+Two passes over one neighbour list. The first sums the density and keeps each particle's state in
+slot order; the second sums the force from the states of both particles:
+
+    rho_i = sum_j m_j W_ij
+    f_i   = -m_i sum_j m_j (P_i/rho_i^2 + P_j/rho_j^2 + Pi_ij) grad_i W_ij
+
+Laws of the fluid reach the terms bound to their parameters (:func:`bound_law`). Everything between
+a neighbour's index and its contribution is free of branches, so that the loops vectorise.
+"""
+
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+import warp as wp
+
+from ..engine.loops import Periodicity, box_type, minimum_image, reader
+from ..engine.neighbors import cells_type
+from ..precision import Precision, function, function_from_source, register
+
+# Where coincident particles are pushed along, within the line or plane of a lower dimension.
+DIRECTIONS = {1: (1.0, 0.0, 0.0), 2: (0.6, 0.8, 0.0), 3: (0.48, 0.6, 0.64)}
+
+
+def bound_law(
+    name: str, law: wp.Function, variables: tuple[str, ...], sources: Mapping[str, str],
+    precision: Precision, params: Any,
+) -> wp.Function:  # fmt: skip
+    """``name(*variables, p)`` that calls ``law`` with, for each of its arguments, its source."""
+    arguments = ", ".join(sources[argument] for argument in law.input_types)
+    signature = ", ".join(f"{variable}: real" for variable in variables)
+    source = f"def {name}({signature}, p: Params):\n    return law({arguments})\n"
+    return function_from_source(source, {"law": law, "real": precision.scalar, "Params": params})
+
+
+def density_term(weight: wp.Function, precision: Precision, data: Any, params: Any) -> wp.Function:
+    """Term m_j w(q), the density without the normalisation of W."""
+    real, vec3, one = precision.scalar, precision.vec3, precision.vector(1)
+    read = reader(precision)
+
+    def add_density(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
+        return one(read(d.m, j) * weight(wp.sqrt(r2) * p.inverse_h))
+
+    return function(add_density)
+
+
+def keep_state(
+    weight: wp.Function, pressure: wp.Function, sound_speed: wp.Function | None,
+    precision: Precision, data: Any, params: Any, out: Any,
+) -> wp.Function:  # fmt: skip
+    """Store: density and pressure of the particle, and (m, rho, P/rho^2, c) in slot order.
+
+    ``sound_speed`` None leaves c at 0.
+    """
+    real, one, vec4 = precision.scalar, precision.vector(1), precision.vector(4)
+    sounds = sound_speed is not None
+
+    def keep(i: int, particle: int, total: one, d: data, p: params, o: out):
+        m = d.m[i]
+        rho = p.sigma * (total[0] + m * weight(real(0.0)))  # the sum is over the others
+        pressure_i = pressure(rho, p)
+        c = real(0.0)
+        if wp.static(sounds):
+            c = sound_speed(rho, pressure_i, p)
+        o.state[i] = vec4(m, rho, pressure_i / (rho * rho), c)
+        o.rho[particle] = rho
+        o.pressure[particle] = pressure_i
+
+    return function(keep)
+
+
+def force_term(
+    slope: wp.Function, viscosity: wp.Function | None, dimension: int, precision: Precision,
+    data: Any, params: Any,
+) -> wp.Function:  # fmt: skip
+    """Term f_ij / m_i = -m_j (P_i/rho_i^2 + P_j/rho_j^2 + Pi_ij) grad_i W_ij.
+
+    grad W vanishes with r, so coincident particles are taken as h apart along a fixed direction,
+    in the order of their slots: they push each other apart, equally and opposite.
+    """
+    real, vec3 = precision.scalar, precision.vec3
+    direction = precision.vec3(*DIRECTIONS[dimension])
+    state_of, velocity_of = reader(precision, 4), reader(precision, 3)
+    viscous = viscosity is not None
+
+    def push(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
+        apart = r2 > p.closest_squared
+        side = wp.where(i < j, -p.smoothing_length, p.smoothing_length)
+        along = x_ij + direction * wp.where(apart, real(0.0), side)
+        distance2 = wp.where(apart, r2, p.smoothing_length * p.smoothing_length)
+        state_i = state_of(d.state, i)
+        state_j = state_of(d.state, j)
+        stress = state_i[2] + state_j[2]
+        if wp.static(viscous):
+            v_ij = velocity_of(d.v, i) - velocity_of(d.v, j)
+            mean = real(0.5) * (state_i + state_j)
+            stress += viscosity(wp.dot(v_ij, x_ij), distance2, mean[1], mean[3], p)
+        # In this order no factor leaves the range of float32 before the others bring it back.
+        gradient = (state_j[0] * p.sigma) * slope(wp.sqrt(distance2) * p.inverse_h)
+        return (along * p.inverse_h) * (-gradient * stress * p.inverse_h)
+
+    return function(push)
+
+
+def virial_term(force: wp.Function, precision: Precision, data: Any, params: Any) -> wp.Function:
+    """Term x_ij . f_ij / 2, the particle's share of the virial."""
+    real, vec3, one = precision.scalar, precision.vec3, precision.vector(1)
+
+    def add_virial(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
+        return one(real(0.5) * d.m[i] * wp.dot(x_ij, force(i, j, x_ij, r2, d, p)))
+
+    return function(add_virial)
+
+
+def add_force(precision: Precision, data: Any, params: Any, out: Any) -> wp.Function:
+    """Store: f += m_i sum."""
+    vec3 = precision.vec3
+
+    def add_to_force(i: int, particle: int, total: vec3, d: data, p: params, o: out):
+        o.f[particle] = o.f[particle] + d.m[i] * total
+
+    return function(add_to_force)
+
+
+def keep_measure(
+    energy: wp.Function, precision: Precision, data: Any, params: Any, out: Any
+) -> wp.Function:
+    """Store: the particle's energy m u(rho) and its share of the virial."""
+    one = precision.vector(1)
+
+    def keep(i: int, particle: int, total: one, d: data, p: params, o: out):
+        u = energy(d.state[i][1], p)
+        o.energy[particle] = o.energy[particle] + wp.float64(d.m[i] * u)
+        o.virial[particle] = o.virial[particle] + wp.float64(total[0])
+
+    return function(keep)
+
+
+@functools.cache
+def cell_coordinates_kernel(precision: Precision) -> wp.Kernel:
+    """Cell coordinates of points, which a grid is built from and asked with."""
+    vec3, Cells = precision.vec3, cells_type(precision)
+
+    @register
+    def point_cells(first: int, cells: Cells, x: wp.array(dtype=vec3), u_out: wp.array(dtype=vec3)):
+        k = first + wp.tid()
+        u_out[k] = cells.turn * (x[k] - cells.origin)
+
+    return point_cells
+
+
+@functools.cache
+def interpolation_kernel(
+    weight: wp.Function, precision: Precision, periodic: Periodicity, params: Any
+) -> wp.Kernel:
+    """Kernel: sum_j V_j A_j W(r - r_j, h) and sum_j V_j W(r - r_j, h) at each point r.
+
+    ``samples`` are (V_j A_j, V_j), the volumes being m_j / rho_j.
+    """
+    real, vec3, vec4, Box = (
+        precision.scalar, precision.vec3, precision.vector(4), box_type(precision),
+    )  # fmt: skip
+    image = minimum_image(precision, periodic)
+
+    @register
+    def interpolate(
+        first: int,
+        grid: wp.uint64,
+        world: int,
+        box: wp.array(dtype=Box),
+        parameters: wp.array(dtype=params),
+        x: wp.array(dtype=vec3),
+        samples: wp.array(dtype=vec4),
+        points: wp.array(dtype=vec3),
+        u: wp.array(dtype=vec3),
+        sums_out: wp.array(dtype=vec4),
+    ):
+        k = first + wp.tid()
+        p = parameters[world]
+        total = vec4()
+        j = int(0)
+        candidates = wp.hash_grid_query(grid, u[k], real(1.0))
+        while wp.hash_grid_query_next(candidates, j):
+            x_ij = image(points[k] - x[j], box[world])
+            r2 = wp.dot(x_ij, x_ij)
+            if r2 < p.cutoff_squared:
+                total += samples[j] * weight(wp.sqrt(r2) * p.inverse_h)
+        sums_out[k] = total * p.sigma
+
+    return interpolate

@@ -1,0 +1,1 @@
+"""Kernels that prepare what is written: surfaces of fluids."""

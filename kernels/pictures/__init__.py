@@ -1,0 +1,1 @@
+"""Kernels of the renderer: views, shapes, light and pixels."""

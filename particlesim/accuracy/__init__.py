@@ -1,0 +1,1 @@
+"""Speed against accuracy: sweeps, searches and stress, each measured."""

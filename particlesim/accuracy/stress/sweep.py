@@ -1,0 +1,146 @@
+"""The sweep: every case beside a finer run of the same start."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from ... import validate
+from ...instruments.errors import SimulationError
+from ...scene.scene import Scene
+from ...scene.settings import Settings
+from ...simulation.simulation import Simulation
+from .cases import Case, cases
+from .table import FAILED, HELD, RECOVERED, REFUSED, Result, Stress
+from .trace import Trace
+
+FINER = 4  # times the substeps of the scene, in the run that shows what is right
+TOLERANCE = 0.2  # of the scales in Trace.difference
+
+
+def stress(
+    build: Callable[[], Scene | Sequence[Scene]],
+    settings: Settings,
+    *,
+    frames: int = 5,
+    tolerance: float = TOLERANCE,
+    device: Any = None,
+    worlds: int | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> Stress:
+    """Run a scene at the extremes of its knobs and of its state, and say how each case ended.
+
+    A case *held* if it ended finite, within ``tolerance`` of the places of a run with four times
+    the substeps of the scene, and with no more energy than that (numerical damping is bounded, and
+    only reported). It was *refused* if an error or a warning said what is wrong, and it *recovered*
+    if it held once the watchdog was told to retry. Otherwise, finite and wrong without a word, or
+    not finite, it *failed*.
+
+    Args:
+        build: Makes the scene, a new one at each call.
+        settings: The scene's own settings.
+        frames: Frames of each case.
+        tolerance: Largest difference in energy and place, over the scales of the finer run.
+        device: As for a Simulation.
+        worlds: As for a Simulation.
+        progress: Called as (done, total, name) before each case.
+
+    Returns:
+        A table of all cases.
+
+    Raises:
+        ValueError: The scene itself, at its own settings, cannot be run.
+
+    Example:
+        >>> import particlesim as ps
+        >>> def build():
+        ...     scene = ps.Scene()
+        ...     scene.add_particles([(0, 1, 0), (1, 1, 0)], velocity=(1, 0, 0))
+        ...     scene.add_interaction(ps.UniformGravity((0, -9.81, 0)))
+        ...     return scene
+        >>> ps.stress(build, ps.Settings(), frames=2, device="cpu").count("failed")
+        0
+    """
+    validate.whole("stress", "frames", frames, minimum=1)
+    validate.number("stress", "tolerance", tolerance, above=0.0)
+    sweep = _Sweep(build, settings, frames, tolerance, device, worlds)
+    every = cases(settings)
+    results = []
+    for k, case in enumerate(every):
+        if progress:
+            progress(k, len(every), case.name)
+        results.append(sweep.run(case))
+    return Stress(tuple(results), settings, frames, tolerance)
+
+
+class _Sweep:
+    def __init__(
+        self, build: Callable[[], Scene | Sequence[Scene]], settings: Settings, frames: int,
+        tolerance: float, device: Any, worlds: int | None,
+    ):  # fmt: skip
+        self.build, self.settings, self.frames = build, settings, frames
+        self.tolerance, self.device, self.worlds = tolerance, device, worlds
+        self._references: dict[Any, Trace] = {}
+
+    def run(self, case: Case) -> Result:
+        """One case, and once more with retries if the watchdog stopped it."""
+        result = self._try(case, self.settings)
+        if result.outcome == REFUSED and result.stopped:
+            again = self._try(case, self.settings.replace(on_failure="retry"))
+            if again.outcome == HELD:
+                return Result(case.name, RECOVERED, again.energy, again.place, result.words)
+        return result
+
+    def _try(self, case: Case, settings: Settings) -> Result:
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            try:
+                trace = self._trace(case, case.knobs(settings))
+            except (ValueError, SimulationError, MemoryError) as error:
+                return Result(
+                    case.name, REFUSED, None, None, str(error), isinstance(error, SimulationError)
+                )
+        words = "; ".join(dict.fromkeys(str(each.message) for each in said))
+        if not trace.finite:
+            return Result(case.name, FAILED, None, None, words or "not finite, without a word")
+        if not case.comparable:
+            return Result(case.name, HELD, None, None, words)
+        energy, place = trace.difference(self._reference(case))
+        held = energy <= self.tolerance and place <= self.tolerance
+        if held and energy < -self.tolerance:
+            # What XPBD and one-sided contacts do at large steps; stable, but worth a word.
+            words = words or f"held by damping: {-energy:.0%} of the energy is lost to the method"
+        outcome = HELD if held else (REFUSED if words else FAILED)
+        return Result(case.name, outcome, energy, place, words)
+
+    def _reference(self, case: Case) -> Trace:
+        """The finer run of the same start; one for all cases that start alike."""
+        if case.disturb not in self._references:
+            finer = self.settings.replace(substeps=FINER * self.settings.substeps)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                self._references[case.disturb] = self._finest(case, finer)
+        return self._references[case.disturb]
+
+    def _finest(self, case: Case, settings: Settings) -> Trace:
+        """A disturbed start may ask for still finer steps than the scene's own start."""
+        for _ in range(3):
+            try:
+                return self._trace(case, settings)
+            except SimulationError:
+                settings = settings.replace(substeps=FINER * settings.substeps)
+        return self._trace(case, settings)
+
+    def _trace(self, case: Case, settings: Settings) -> Trace:
+        trace = Trace()
+        sim = Simulation(self.build(), settings, device=self.device, worlds=self.worlds)
+        try:
+            if case.disturb is not None:
+                sim.diagnostics()  # has every array there that a case may change
+                case.disturb(sim)
+            trace.add(sim)
+            sim.run(self.frames, progress=lambda done, frames: trace.add(sim))
+        finally:
+            sim.close()
+        return trace

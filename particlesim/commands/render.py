@@ -1,0 +1,224 @@
+"""The command ``particlesim render``: pictures and films of recordings and scenes."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import validate
+from ..output.progress import Meter, bar
+from ..pictures.render import film, image
+from ..pictures.render.camera import FIELD_OF_VIEW, Camera
+
+if TYPE_CHECKING:
+    from ..pictures.render.stage import View
+
+OWNER = "render"
+ENGINES = ("warp", "cycles")
+USD = (".usda", ".usd", ".usdc", ".usdz")
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the command line asks for; see its help."""
+
+    out: Path
+    frame: int | None = None
+    frames: str | None = None
+    camera: str | None = None
+    color: str | None = None
+    color_map: str = "viridis"
+    color_range: str | None = None
+    width: int = 1280
+    height: int = 720
+    ground: bool | None = None
+    fps: float | None = None
+    engine: str = "warp"
+    samples: int = 64
+    python: str | None = None
+    device: str | None = None
+    overwrite: bool = False
+
+    def __post_init__(self) -> None:
+        validate.choice(OWNER, "engine", self.engine, ENGINES)
+        formats = (*image.FORMATS, *film.FORMATS)
+        image.check_output(OWNER, self.out, formats, self.overwrite, "give --overwrite")
+        if not self.is_film and self.frames is not None:
+            raise validate.fail(
+                OWNER, "--frames", "be of a film, .gif or .mp4", str(self.out),
+                "give --frame for one picture",
+            )  # fmt: skip
+        if self.is_film and self.frame is not None:
+            raise validate.fail(
+                OWNER, "--frame", "be of one picture", str(self.out), "give --frames a:b for a film"
+            )
+        # What is missing is better known before the work.
+        if self.out.suffix.lower() == ".mp4":
+            film.ffmpeg()
+        else:
+            image.pillow()
+
+    @property
+    def is_film(self) -> bool:
+        """Whether many pictures are asked for."""
+        return self.out.suffix.lower() in film.FORMATS
+
+    def viewpoint(self, view: View) -> Camera:
+        """The camera: the one asked for, or the file's own, or one that sees all."""
+        if self.camera is None:
+            points, radius = view.geometry.points()
+            aspect = self.width / self.height
+            return view.camera or Camera.around(points, view.up, aspect, radius)
+        numbers = parse_numbers("--camera", self.camera, (6, 7), "px,py,pz,tx,ty,tz[,angle]")
+        angle = numbers[6] if len(numbers) == 7 else FIELD_OF_VIEW
+        return Camera(numbers[:3], numbers[3:6], view.up, angle)
+
+
+def render(name: str, request: Request, meter: Meter, simulate: Callable[[], Any]) -> str:
+    """Make what is asked for, and say what was done.
+
+    Args:
+        name: A USD file, or a scene.
+        request: What is asked for.
+        meter: Counts the frames of a film.
+        simulate: Makes the simulation, where ``name`` is a scene.
+    """
+    path = Path(name)
+    with tempfile.TemporaryDirectory(prefix="particlesim-") as folder:
+        if path.suffix.lower() not in USD:
+            if request.is_film:
+                raise validate.fail(
+                    OWNER, "FILE", "be a recording for a film", name,
+                    f"run it first: particlesim run {name} --out {path.stem}.usda",
+                )  # fmt: skip
+            path = _recorded(simulate(), request, Path(folder) / "frame.usda")
+        return _render_file(path, name, request, meter)
+
+
+def _recorded(sim: Any, request: Request, path: Path) -> Path:
+    """One frame of a scene, as a file."""
+    from ..output.usd.recorder import UsdRecorder
+
+    sim.run(frames=request.frame or 0)
+    fields = [request.color] if request.color else []
+    layout = "grid" if sim.world_count > 1 else None
+    with UsdRecorder(sim, path, frames=0, fields=fields, layout=layout) as recorder:
+        recorder.write()
+    return path
+
+
+def _render_file(path: Path, name: str, request: Request, meter: Meter) -> str:
+    from ..output.usd_tools.recording import Recording
+    from ..pictures.render.paint import Paint, check_field, spanned
+
+    recording = Recording(OWNER, path)
+    stage, there = recording.stage, recording.frames() or [0.0]
+    frames = _chosen(request, there)
+    paint = Paint()
+    if request.color is not None:
+        check_field(stage, request.color)
+        limits = request.color_range
+        span = (
+            spanned(stage, request.color, frames)
+            if limits is None
+            else parse_numbers("--color-range", limits, (2,), "low,high")
+        )
+        paint = Paint(request.color, request.color_map, (span[0], span[1]))
+    with ExitStack() as stack:
+        if request.engine == "cycles":
+            from ..pictures.render import cycles
+
+            pictures = cycles.pictures(recording, frames, paint, request, stack)
+        else:
+            pictures = _pictures(recording, frames, paint, request, stack)
+        if not request.is_film:
+            (picture,) = pictures
+            image.Image(picture).save(request.out, overwrite=request.overwrite)
+            return f"frame {frames[0]:g} of {name} drawn in {request.out}"
+        step = frames[1] - frames[0] if len(frames) > 1 else 1.0
+        fps = request.fps or (stage.GetFramesPerSecond() or 24.0) / step
+        with film.open_film(request.out, fps) as made:
+            for picture in _counted(pictures, len(frames), meter):
+                made.add(picture)
+    return f"{len(frames)} frames of {name} drawn in {request.out}, {fps:.4g} a second"
+
+
+def _pictures(
+    recording: Any, frames: list[float], paint: Any, request: Request, stack: ExitStack
+) -> Iterator[np.ndarray]:
+    """The pictures of the frames, by Warp."""
+    from ..output.usd_tools.recording import PORTION, Recording
+    from ..pictures.render.look import Look
+    from ..pictures.render.preview import ground_height
+    from ..pictures.render.renderer import Renderer
+    from ..pictures.render.stage import look_at
+
+    renderer = Renderer(request.device)
+    stack.callback(renderer.close)
+    camera = None
+    for number, frame in enumerate(frames):
+        if number and number % PORTION == 0:  # a stage keeps all clips open that it has read
+            recording = Recording(OWNER, recording.path)
+        view = look_at(recording.stage, frame, paint)
+        look = Look(up=view.up, ground=ground_height(view, request.ground))
+        camera = camera or request.viewpoint(view)
+        yield renderer.draw(view.geometry, camera, request.width, request.height, look).array
+
+
+def _counted(pictures: Iterable[np.ndarray], count: int, meter: Meter) -> Iterator[np.ndarray]:
+    """The pictures, with a bar on a terminal."""
+    meter.frames = count
+    with bar("render", "frames") as show:
+        for picture in pictures:
+            yield picture
+            meter.done += 1
+            show(meter.done, count, "drawing")
+
+
+def _chosen(request: Request, there: list[float]) -> list[float]:
+    """The frames asked for, of those that are there; of a picture the last."""
+    if not request.is_film:
+        if request.frame is None or len(there) == 1:
+            return there[-1:]
+        if request.frame not in there:
+            raise validate.fail(
+                OWNER, "--frame", f"be from {there[0]:g} to {there[-1]:g}", request.frame,
+                "choose one that is there",
+            )  # fmt: skip
+        return [float(request.frame)]
+    if request.frames is None:
+        return there
+    words = request.frames.split(":")
+    try:
+        first, last, step = ([int(w) if w else None for w in words] + [None] * 2)[:3]
+        if len(words) not in (2, 3) or (step is not None and step < 1):
+            raise ValueError
+    except ValueError:
+        raise validate.fail(
+            OWNER, "--frames", "be first:last or first:last:step", request.frames, "as 0:120"
+        ) from None
+    low, high = first or 0, there[-1] if last is None else last
+    frames = [f for f in there if (first is None or f >= low) and f <= high][:: step or 1]
+    if not frames:
+        raise validate.fail(
+            OWNER, "--frames", f"hold some of {there[0]:g} to {there[-1]:g}", request.frames,
+            "choose some that are there",
+        )  # fmt: skip
+    return frames
+
+
+def parse_numbers(option: str, text: str, counts: tuple[int, ...], form: str) -> list[float]:
+    """Numbers with commas between them, as many as one of ``counts``."""
+    try:
+        numbers = [float(word) for word in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in counts or not np.isfinite(numbers).all():
+        raise validate.fail(OWNER, option, f"be {form}", text, "give numbers with commas between")
+    return numbers

@@ -1,0 +1,25 @@
+"""The commands ``particlesim usd info | check | pack``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..output.usd_tools.check import check
+from ..output.usd_tools.info import info
+from ..output.usd_tools.pack import pack
+
+
+def show(path: Path) -> str:
+    """What is inside a file, as text."""
+    return str(info(path))
+
+
+def complaints(path: Path) -> list[str]:
+    """One line a fault."""
+    return [str(fault) for fault in check(path)]
+
+
+def packed(path: Path, out: Path, overwrite: bool) -> str:
+    """Pack, and say what was done."""
+    frames = pack(path, out, overwrite=overwrite)
+    return f"{frames} frames of {path} written to {out}, {out.stat().st_size:,} bytes"

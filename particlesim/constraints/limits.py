@@ -1,0 +1,108 @@
+"""Limits of constraints: speeds of contacts, and what is to be known where nothing limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..instruments.stability.report import Limit
+
+if TYPE_CHECKING:
+    from ..engine.probing.probe import Probe
+    from .boundary import BoxBoundary, SphereBoundary
+    from .constraint import Constraint
+    from .contact import Contact
+
+
+def contact_limits(part: Contact, probe: Probe) -> list[Limit]:
+    """No particle may pass its own radius in a substep: v dt + a dt^2 <= R.
+
+    Two that run into each other then come no further than to each other's middle, which contacts
+    turn back; past it they miss each other. v in the frame of the world's mean velocity.
+    """
+    if not part.count:
+        return []
+    rows = part.pairs.members_host
+    radius = probe.state.radius.numpy()[rows].astype(np.float64)
+    rows, radius = rows[radius > 0], radius[radius > 0]
+    if not len(rows):
+        return []
+    v, a = probe.relative_speed(rows), np.linalg.norm(probe.acceleration[rows], axis=1)
+    with np.errstate(divide="ignore"):
+        dt = 2.0 * radius / (v + np.sqrt(v**2 + 4.0 * a * radius))
+    k = int(np.argmin(dt))
+    if not np.isfinite(dt[k]):
+        return []
+    reason = f"v dt + a dt^2 = R, R = {radius[k]:.4g}, v = {v[k]:.4g}, a = {a[k]:.4g}"
+    return [Limit(part.name, "speed", float(dt[k]), reason, *probe.place(int(rows[k])))]
+
+
+def box_limits(part: BoxBoundary, probe: Probe) -> list[Limit]:
+    """No particle may cross the box in a substep: |v| dt <= upper - lower, along each axis."""
+
+    names = [f"width / v along {axis}" for axis in "xyz"]
+    return _crossing(part, probe, names, lambda box, v: (box.upper - box.lower) / np.abs(v))
+
+
+def sphere_limits(part: SphereBoundary, probe: Probe) -> list[Limit]:
+    """No particle may pass the middle of an obstacle, or cross a container: |v| dt <= radius."""
+
+    return _crossing(
+        part, probe, ["radius / v"],
+        lambda ball, v: ball.radius / np.linalg.norm(v, axis=1, keepdims=True),
+    )  # fmt: skip
+
+
+def _crossing(
+    part: Any, probe: Probe, names: list[str], times: Callable[[Any, np.ndarray], np.ndarray]
+) -> list[Limit]:
+    """The shortest time that any particle takes, at its velocity against the boundary's.
+
+    Args:
+        part: The boundary of all worlds.
+        probe: What asks.
+        names: What the k times of a particle are.
+        times: Of one world's boundary and velocities (m, 3): the times, (m, k).
+    """
+    found = []
+    members = part.held.particle.numpy()
+    for w, peer in enumerate(part.peers):
+        rows = members[probe.model.world_of[members] == w]
+        if len(rows):
+            v = probe.velocity[rows] - peer.velocity
+            with np.errstate(divide="ignore"):
+                dt = times(peer, v)
+            k, which = (int(each) for each in np.unravel_index(np.argmin(dt), dt.shape))
+            if np.isfinite(dt[k, which]):
+                reason = f"{names[which]}, v = {np.linalg.norm(v[k]):.4g}"
+                place = probe.place(int(rows[k]))
+                found.append(Limit(part.name, "speed", float(dt[k, which]), reason, *place))
+    return [min(found, key=lambda limit: limit.dt)] if found else []
+
+
+def constraint_limits(part: Constraint, probe: Probe) -> list[Limit]:
+    """XPBD takes any step, and damps: E falls by 1 / (1 + omega^2 dt^2) a substep.
+
+    For constraints whose gradients are unit vectors omega^2 = sum w / alpha is known; the time in
+    which the stiffest one's energy falls to 1/e is told.
+    """
+    if not part.count:
+        return []
+    reason = "any: implicit"
+    dt = probe.settings.substep
+    if part.unit and dt > 0:
+        w = probe.inverse_mass[part.tuples.particles].sum(axis=1)
+        alpha = np.concatenate([peer.compliance for peer in part.peers])[part.tuples.order]
+        soft = (alpha > 0) & (w > 0)
+        if soft.any():
+            omega = float(np.sqrt((w[soft] / alpha[soft]).max()))
+            time = dt / math.log1p((omega * dt) ** 2)
+            reason += (
+                f"; at omega = {omega:.4g} /s this substep damps energy to 1/e in {time:.3g} s"
+            )
+        elif w.any():
+            reason += "; rigid, so motion along it stops within a substep"
+    return [Limit(part.name, "damping in time", math.inf, reason)]

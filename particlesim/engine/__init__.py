@@ -1,0 +1,1 @@
+"""The engine: model, state, neighbours and the loop. It knows abstract parts only."""

@@ -1,0 +1,1 @@
+"""How recorded frames run: launches, graphs and threads."""

@@ -1,0 +1,180 @@
+"""Model: the scenes of a batch merged into one set of host arrays, on a device and a precision."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from .. import validate
+from ..kernels.engine.loops import Periodicity, box_type
+from ..kernels.precision import PRECISIONS, structure
+from ..scene.scene import Group, Scene
+from ..scene.settings import Settings
+
+
+def choose_device(device: Any) -> Any:
+    """The Warp device of that name; None: CUDA where there is one, else the CPU."""
+    wp.init()
+    cuda = wp.is_cuda_available()
+    if device is None:
+        return wp.get_device("cuda:0" if cuda else "cpu")
+    there = [each.alias for each in wp.get_devices()]
+    if str(device) in there or (cuda and str(device) == "cuda"):
+        return wp.get_device(str(device))
+    raise validate.fail(
+        "Simulation", "device", f"be one of {', '.join(there)}", str(device), "choose one"
+    )
+
+
+def select(scene: Scene, group: Any, owner: str) -> np.ndarray:
+    """Sorted indices that ``group`` stands for: None (all), a Group, several, or indices."""
+    if group is None:
+        return np.arange(scene.particle_count)
+    if isinstance(group, Group):
+        if group.scene is not scene:
+            raise validate.fail(owner, "group", "belong to the scene", group, "use its own group")
+        return group.indices
+    if isinstance(group, list | tuple) and group and all(isinstance(g, Group) for g in group):
+        return np.unique(np.concatenate([select(scene, g, owner) for g in group]))
+    index = np.asarray(group)
+    if index.size == 0:
+        return np.zeros(0, dtype=np.int64)
+    if index.ndim != 1 or not np.issubdtype(index.dtype, np.integer):
+        raise validate.fail(owner, "group", "be groups or indices", group, "pass a Group")
+    if index.min() < 0 or index.max() >= scene.particle_count:
+        worst = index.max() if index.max() >= scene.particle_count else index.min()
+        raise validate.fail(
+            owner, "group", f"hold indices from 0 to {scene.particle_count - 1}", int(worst),
+            "index the scene's particles",
+        )  # fmt: skip
+    return np.unique(index)
+
+
+class Model:
+    """What the kernels are built for: worlds, particles, device, precision and settings.
+
+    Particles of world w are the rows ``offsets[w]:offsets[w + 1]`` of every per-particle array.
+    """
+
+    def __init__(self, scenes: Sequence[Scene], settings: Settings, device: Any):
+        self.scenes = list(scenes)
+        self.settings = settings
+        self.device = choose_device(device)
+        self.precision = PRECISIONS[settings.precision]
+        self.world_count = len(self.scenes)
+        counts = np.array([scene.particle_count for scene in self.scenes], dtype=np.int64)
+        self.offsets = np.concatenate([[0], np.cumsum(counts)])
+        self.particle_count = int(self.offsets[-1])
+        if self.particle_count >= 2**31:
+            raise validate.fail(
+                "Simulation", "particles", "number below 2^31", self.particle_count, "use fewer"
+            )
+        self.world_of = np.repeat(np.arange(self.world_count), counts)
+        self.periodic = self._periodicity()
+        self.box = self._boxes()
+        self.attributes = self._attributes()
+
+    @property
+    def vectorised(self) -> bool:
+        """Loops over pairs are C++ for the CPU's vector units, rather than Warp's own."""
+        return bool(self.device.is_cpu)
+
+    def _attributes(self) -> dict[str, int | None]:
+        result: dict[str, int | None] = {}
+        for w, scene in enumerate(self.scenes):
+            for name, width in scene.attributes.items():
+                if result.setdefault(name, width) != width:
+                    raise validate.fail(
+                        "Simulation", f"scenes[{w}].{name}",
+                        f"be {'numbers' if width else 'vectors'} as in the scenes before",
+                        "vectors" if width else "numbers", "make a batch of scenes of one kind",
+                    )  # fmt: skip
+        return result
+
+    def _periodicity(self) -> Periodicity:
+        kinds = {scene.periodic[2] if scene.periodic else (False,) * 3 for scene in self.scenes}
+        if len(kinds) > 1:
+            raise validate.fail(
+                "Simulation", "scenes", "be periodic along the same axes", sorted(kinds),
+                "make a batch of scenes of one kind",
+            )  # fmt: skip
+        return Periodicity(*kinds.pop())
+
+    def _boxes(self) -> wp.array:
+        Box = box_type(self.precision)
+        self.box_lower = np.zeros((self.world_count, 3))
+        self.box_length = np.zeros((self.world_count, 3))
+        for w, scene in enumerate(self.scenes):
+            if scene.periodic:
+                self.box_lower[w] = scene.periodic[0]
+                self.box_length[w] = scene.periodic[1] - scene.periodic[0]
+        inverse = np.divide(
+            1.0, self.box_length, out=np.zeros_like(self.box_length), where=self.box_length > 0
+        )
+        columns = {"lower": self.box_lower, "length": self.box_length, "inverse": inverse}
+        return self.structures(Box, columns)
+
+    def structures(self, kind: Any, columns: dict[str, np.ndarray]) -> wp.array:
+        """An array of ``wp.struct`` from one host column a field."""
+        count = len(next(iter(columns.values())))
+        host = np.zeros(count, dtype=kind.numpy_dtype())
+        for name, column in columns.items():
+            host[name] = column
+        return wp.array(host, dtype=kind, device=self.device)
+
+    def parameters(self, name: str, columns: dict[str, np.ndarray]) -> tuple[Any, wp.array]:
+        """A parameter struct and its array, one entry a world or an item.
+
+        Columns are (count,) numbers, whole if they are integers, or (count, 3) vectors.
+        """
+        precision = self.precision
+        kinds = {
+            key: wp.int32 if np.issubdtype(column.dtype, np.integer)
+            else precision.vec3 if np.ndim(column) == 2 else precision.scalar
+            for key, column in columns.items()
+        }  # fmt: skip
+        kind = parameter_struct(name, tuple(kinds.items()))
+        return kind, self.structures(kind, columns)
+
+    def array(self, values: Any, dtype: Any) -> wp.array:
+        """A device array of host values."""
+        return wp.array(np.ascontiguousarray(values), dtype=dtype, device=self.device)
+
+    def column(self, name: str) -> np.ndarray:
+        """A per-particle array of all worlds, from the scenes."""
+        width = self.attributes.get(name, 3 if name in ("position", "velocity") else None)
+        parts = []
+        for scene in self.scenes:
+            shape = (scene.particle_count,) if width is None else (scene.particle_count, width)
+            part = scene.column(name)
+            parts.append(part if part.shape == shape else np.zeros(shape))
+        return np.concatenate(parts)
+
+    def wrapped(self, position: np.ndarray) -> np.ndarray:
+        """Positions moved into the periodic box of their world."""
+        length = self.box_length[self.world_of]
+        lower = self.box_lower[self.world_of]
+        inside = np.divide(position - lower, length, out=np.zeros_like(position), where=length > 0)
+        return position - length * np.floor(inside)
+
+    def members(self, groups: Sequence[Any], owner: str) -> np.ndarray:
+        """Rows of the particles that each world's own ``group`` stands for, world by world."""
+        chosen = [
+            select(scene, group, owner) + self.offsets[w]
+            for w, (scene, group) in enumerate(zip(self.scenes, groups, strict=True))
+        ]
+        return np.concatenate(chosen).astype(np.int32)
+
+
+_STRUCTS: dict[tuple, Any] = {}
+
+
+def parameter_struct(name: str, fields: tuple[tuple[str, Any], ...]) -> Any:
+    """The struct of these fields; the same one for the same fields, so kernels are reused."""
+    key = (name, fields)
+    if key not in _STRUCTS:
+        _STRUCTS[key] = structure(name, dict(fields))
+    return _STRUCTS[key]

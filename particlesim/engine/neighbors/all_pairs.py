@@ -1,0 +1,90 @@
+"""Every particle of the own world: the plainest answer to who looks at whom."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ...kernels.engine import neighbors as kernels
+from ...kernels.engine.loops import ALL, Pairs
+from ..execution.launch import launch
+from ..model import Model
+from ..state import State
+
+
+class AllPairs:
+    """Every particle of the own world among the members, without a list."""
+
+    partners = ALL
+
+    def __init__(self, model: Model, members: np.ndarray):
+        self.model, self.count = model, len(members)
+        self.members_host = members
+        worlds = model.world_of[members]
+        edges = np.arange(model.world_count)
+        self.begin_host = np.searchsorted(worlds, edges, side="left")
+        self.end_host = np.searchsorted(worlds, edges, side="right")
+        self.members = model.array(members, wp.int32)
+        self.world = model.array(worlds, wp.int32)
+        # A loop over all particles in their own order reads the state's arrays themselves.
+        self.sorted = len(members) != model.particle_count
+        self.order = self.members
+        self.names: set[str] = {"position"}
+        self.fields: dict[str, wp.array] = {}
+        self.pairs = Pairs()
+        self.pairs.world = self.world
+        self.pairs.begin = model.array(self.begin_host, wp.int32)
+        self.pairs.end = model.array(self.end_host, wp.int32)
+        self.users: list[str] = []
+        # By world: whether it renews the list before interactions, and before constraints.
+        self.for_interactions, self.for_constraints = np.zeros((2, model.world_count), dtype=bool)
+        self.leader = np.zeros(model.world_count, dtype=int)  # see Neighbors
+
+    def request(self, names: set[str]) -> None:
+        """Have these per-particle arrays ready in slot order at every update."""
+        self.names |= names
+
+    def allocate(self, state: State) -> None:
+        """Make the arrays, once all requests are in."""
+        self.pairs.order = self.order
+        for name in sorted(self.names):
+            source = state[name]
+            if self.sorted:
+                self.fields[name] = wp.zeros(
+                    self.count, dtype=source.dtype, device=self.model.device
+                )
+            else:
+                self.fields[name] = source
+
+    def update(self, state: State, *, for_constraint: bool = False) -> None:
+        """Bring the slot-ordered copies up to date."""
+        self.gather(state, self.names)
+
+    def gather(self, state: State, names: set[str]) -> None:
+        """Copy these arrays into slot order; nothing to do where that is their own order."""
+        if not self.sorted:
+            return
+        for name in sorted(names):
+            target = self.fields[name]
+            launch(
+                kernels.gather_kernel(target.dtype),
+                self.count,
+                [self.order, state[name], target],
+                self.model.device,
+            )
+
+    def array(self, dtype: Any) -> wp.array:
+        """A new array over the slots."""
+        return wp.zeros(self.count, dtype=dtype, device=self.model.device)
+
+    def describe(self) -> str:
+        """One line for reports."""
+        return f"all pairs of {self.count} particles, for {', '.join(self.users)}"
+
+    @property
+    def memory(self) -> int:
+        """Bytes of the arrays that are the list's own."""
+        own = [self.members, self.world, *(self.fields.values() if self.sorted else ())]
+        return sum(a.capacity for a in own)

@@ -1,0 +1,228 @@
+"""Probe: asks the parts of a simulation how they react, and leaves no trace in it."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+import warp as wp
+
+from ...instruments.stability.report import Limit, explicit_step
+from ..execution.launch import owner
+from .spacing import spacing
+from .spectrum import Largest, largest
+
+if TYPE_CHECKING:
+    from ...interactions.base import Interaction
+    from ...simulation.simulation import Simulation
+
+STEPS = 30  # applications of a Jacobian, two evaluations of the force each
+TOLERANCE = 0.005  # of an eigenvalue: half of that in the frequency
+MEMORY = 4e7  # numbers to keep at most, for large scenes
+
+
+class Probe:
+    """What parts are given to find their limits with (``Interaction.limits``).
+
+    Within the context the state may be written; at its end every array is as it was, bit for bit.
+    Rows of neighbours are used as they are and never made anew.
+
+    Args:
+        sim: The simulation, at any moment outside a step.
+        quick: Rates that are surely within the settings' limits need not be exact.
+    """
+
+    def __init__(self, sim: Simulation, quick: bool = False):
+        self.sim, self.model, self.state, self.quick = sim, sim.model, sim.state, quick
+        self.settings = sim.settings
+        self.rates: list[tuple[Interaction, float, float]] = []  # omega^2, gamma of those asked
+
+    def __enter__(self) -> Self:
+        self._kept = {name: wp.clone(array) for name, array in self.state.arrays.items()}
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        for name, array in self._kept.items():
+            wp.copy(self.state.arrays[name], array)
+        self._gather()
+        del self._kept
+
+    # What is there ----------------------------------------------------------------------------
+
+    @functools.cached_property
+    def position(self) -> np.ndarray:
+        """(n, 3), float64."""
+        return self._host("position")
+
+    @functools.cached_property
+    def velocity(self) -> np.ndarray:
+        """(n, 3), float64."""
+        return self._host("velocity")
+
+    @functools.cached_property
+    def inverse_mass(self) -> np.ndarray:
+        """w = 1 / m, 0 for pinned particles, (n,)."""
+        if "inverse_mass" in self.state:
+            return self._host("inverse_mass")
+        start = self.state.start("inverse_mass")
+        assert start is not None
+        return start
+
+    @functools.cached_property
+    def mass(self) -> np.ndarray:
+        """Masses, of pinned particles too, (n,)."""
+        if "mass" in self.state:
+            return self._host("mass")
+        return self.model.column("mass")
+
+    @functools.cached_property
+    def acceleration(self) -> np.ndarray:
+        """By all interactions at the present state, (n, 3)."""
+        if "force" not in self.state:
+            return np.zeros_like(self.position)
+        return self.force(self.sim.passes) * self.inverse_mass[:, None]
+
+    @functools.cached_property
+    def spacing(self) -> float:
+        """About the distance of the closest particles [length]; above 0."""
+        return spacing(self)
+
+    def relative_speed(self, rows: np.ndarray) -> np.ndarray:
+        """Speeds of these particles in the frame of their world's mean velocity."""
+        v, world = self.velocity[rows], self.model.world_of[rows]
+        count = np.maximum(np.bincount(world, minlength=self.model.world_count), 1)
+        mean = np.stack(
+            [np.bincount(world, v[:, axis], self.model.world_count) for axis in range(3)], axis=1
+        ) / count[:, None]  # fmt: skip
+        return np.linalg.norm(v - mean[world], axis=1)
+
+    def place(self, row: int) -> tuple[int, int]:
+        """World and particle of a row of the state's arrays."""
+        world = int(self.model.world_of[row])
+        return world, int(row - self.model.offsets[world])
+
+    # How parts react --------------------------------------------------------------------------
+
+    def force(
+        self,
+        parts: Sequence[Interaction],
+        position: np.ndarray | None = None,
+        velocity: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Force of some interactions on every particle, (n, 3), float64; here or elsewhere."""
+        for name, value in (("position", position), ("velocity", velocity)):
+            if value is None:
+                wp.copy(self.state[name], self._kept[name])
+            else:
+                self.state[name].assign(value.astype(self.model.precision.numpy))
+        self._gather()
+        self.state.clear_forces()
+        for part in parts:
+            with owner(part.name):
+                part.apply(self.state, self.sim.neighbors, self.settings.substep)
+        return self._host("force")
+
+    def response(
+        self, part: Interaction, most: tuple[float, float] = (np.inf, np.inf)
+    ) -> list[Limit]:
+        """The limit from the gradients of a part's force, by differences; none if it has none.
+
+        omega^2 is the largest eigenvalue of -W^(1/2) (df/dx) W^(1/2), gamma that of the same with
+        df/dv, W the inverse masses; ``most`` are upper bounds of both that the part knows.
+        """
+        return self.together([part], most)
+
+    def together(
+        self, parts: Sequence[Interaction], most: tuple[float, float] = (np.inf, np.inf)
+    ) -> list[Limit]:
+        """As :meth:`response`, of the sum of several parts."""
+        if "force" not in self.state or not self._mobile.any():
+            return []
+        frequency, damping = (self._largest(parts, what) for what in ("position", "velocity"))
+        omega_squared, gamma = min(frequency.bound, most[0]), min(damping.bound, most[1])
+        if omega_squared == gamma == 0.0:
+            return []
+        if len(parts) == 1:
+            self.rates.append((parts[0], omega_squared, gamma))
+        name = " + ".join(part.name for part in parts)
+        dt = explicit_step(omega_squared, gamma)
+        place = self._peak(frequency if omega_squared else damping)
+        return [Limit(name, *_words(omega_squared, gamma, dt), *place)]
+
+    def damping(self, part: Interaction) -> float:
+        """gamma alone, the largest rate at which a part's force answers to velocities [1/time]."""
+        return self._largest([part], "velocity").bound
+
+    def _peak(self, found: Largest) -> tuple[int, int]:
+        """World and particle where an eigenvector is largest."""
+        row = int(np.argmax((found.vector.reshape(-1, 3) ** 2).sum(axis=1)))
+        return self.place(int(np.nonzero(self._mobile)[0][row]))
+
+    def _largest(self, parts: Sequence[Interaction], what: str) -> Largest:
+        """The largest eigenvalue of the Jacobian with respect to position or velocity."""
+        apply = self._operator(parts, what)
+        rng = np.random.default_rng(0)
+        start = rng.normal(size=3 * int(self._mobile.sum()))
+        steps = max(4, min(STEPS, int(MEMORY / (2 * len(start)))))
+        enough = 0.0
+        if self.quick:
+            dt = self.settings.substep
+            enough = 4.0 / dt**2 if what == "position" else 2.0 / dt
+        return largest(apply, start, steps=steps, tolerance=TOLERANCE, enough=enough)
+
+    def _operator(
+        self, parts: Sequence[Interaction], what: str
+    ) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """-W^(1/2) J W^(1/2) on the mobile particles, by central differences."""
+        mobile, real = self._mobile, self.model.precision.numpy
+        root = np.sqrt(self.inverse_mass[mobile])[:, None]
+        at = self.position if what == "position" else self.velocity
+        # The cube root balances the error of a central difference and the rounding of the force.
+        size = self.spacing if what == "position" else self._speed
+        step = max(np.cbrt(np.finfo(real).eps) * size, 8 * np.spacing(np.abs(at).max(), dtype=real))
+
+        def apply(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            moved = np.zeros_like(at)
+            moved[mobile] = root * q.reshape(-1, 3)
+            moved *= step / max(np.linalg.norm(moved, axis=1).max(), 1e-300)
+            ahead, behind = ((at + way * moved).astype(real).astype(float) for way in (1, -1))
+            with np.errstate(invalid="ignore", over="ignore"):  # not finite: told as such
+                gain = self.force(parts, **{what: ahead}) - self.force(parts, **{what: behind})
+            twice = 2.0 * np.linalg.norm(((ahead - behind)[mobile] / root).ravel()) or 1.0
+            done = (ahead - behind)[mobile] / root
+            return 2.0 * done.ravel() / twice, (-2.0 / twice * root * gain[mobile]).ravel()
+
+        return apply
+
+    @functools.cached_property
+    def _mobile(self) -> np.ndarray:
+        return self.inverse_mass > 0
+
+    @property
+    def _speed(self) -> float:
+        """A typical speed, for differences; where nothing moves, a slow one."""
+        fastest = float(np.linalg.norm(self.velocity, axis=1).max(initial=0.0))
+        return fastest or 1e-3 * self.spacing / self.settings.substep
+
+    def _host(self, name: str) -> np.ndarray:
+        return self.state[name].numpy().astype(np.float64)
+
+    def _gather(self) -> None:
+        """Copy what the loops read into the order of their rows."""
+        for each in self.sim.neighbors.lists:
+            each.gather(self.state, each.names)
+
+
+def _words(omega_squared: float, gamma: float, dt: float) -> tuple[str, float, str]:
+    """Kind, substep and reason of a limit from rates."""
+    if not np.isfinite(omega_squared + gamma):
+        return "force", 0.0, "the force is not finite at the present state"
+    omega = float(np.sqrt(omega_squared))
+    rates = f"omega = {omega:.4g} /s, gamma = {gamma:.4g} /s"
+    if not gamma:
+        return "frequency", dt, f"2 / omega, omega = {omega:.4g} /s"
+    if not omega:
+        return "damping", dt, f"2 / gamma, gamma = {gamma:.4g} /s"
+    return "frequency and damping", dt, f"4 / (gamma + sqrt(gamma^2 + 4 omega^2)), {rates}"

@@ -1,0 +1,108 @@
+"""Tuples of particles that belong together: checks, batching and bookkeeping of bonds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from .. import validate
+from .model import Model
+
+
+def tuples(owner: str, argument: str, value: Any, arity: int | None) -> np.ndarray:
+    """``value`` as (m, arity) particle indices, distinct within a row."""
+    index = np.asarray(value)
+    if index.size == 0:
+        return np.zeros((0, arity or 2), dtype=np.int64)
+    if index.ndim == 1 and arity == 1:
+        index = index[:, None]
+    wrong = index.ndim != 2 or not np.issubdtype(index.dtype, np.integer)
+    if wrong or (arity is not None and index.shape[1] != arity):
+        raise validate.fail(
+            owner, argument, f"have shape (m, {arity or 'k'}) of indices", index,
+            "give one row of particle indices each",
+        )  # fmt: skip
+    if index.min() < 0:
+        raise validate.fail(
+            owner, argument, "hold indices from 0 up", int(index.min()), "count from 0"
+        )
+    ordered = np.sort(index, axis=1)
+    same = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
+    if same.any():
+        at = int(np.argmax(same))
+        raise validate.fail(
+            owner, f"{argument}[{at}]", "name different particles", index[at].tolist(),
+            "leave the row out",
+        )  # fmt: skip
+    return index.astype(np.int64)
+
+
+def merged(owner: str, argument: str, model: Model, each: Sequence[np.ndarray]) -> np.ndarray:
+    """Tuples of all worlds as rows of the state's arrays."""
+    parts = []
+    for w, index in enumerate(each):
+        count = model.scenes[w].particle_count
+        if index.size and index.max() >= count:
+            raise validate.fail(
+                owner, argument, f"hold indices from 0 to {count - 1}", int(index.max()),
+                "index the scene's particles",
+            )  # fmt: skip
+        parts.append(index + model.offsets[w])
+    return np.concatenate(parts)
+
+
+def per_item(owner: str, argument: str, value: Any, count: int, *, minimum: float) -> np.ndarray:
+    """One value an item, of at least ``minimum``."""
+    result = validate.rows(owner, argument, value, count, None)
+    if result.size and result.min() < minimum:
+        at = int(np.argmin(result))
+        raise validate.fail(
+            owner, f"{argument}[{at}]", f"be at least {minimum:g}", float(result[at]),
+            "give a larger one",
+        )  # fmt: skip
+    return result
+
+
+def incidence(pairs: np.ndarray) -> dict[str, np.ndarray]:
+    """The bonds of every particle: particle, begin, partner and bond (see kernels.bonded)."""
+    ends = pairs.reshape(-1)
+    partner = pairs[:, ::-1].reshape(-1)
+    bond = np.repeat(np.arange(len(pairs)), 2)
+    order = np.argsort(ends, kind="stable")
+    particle, begin = np.unique(ends[order], return_index=True)
+    return {
+        "particle": particle,
+        "begin": np.append(begin, len(ends)),
+        "partner": partner[order],
+        "bond": bond[order],
+    }
+
+
+def distances(model: Model, w: int, pairs: np.ndarray) -> np.ndarray:
+    """Distances of the pairs of world w at the start, (m,); to the nearest image."""
+    scene = model.scenes[w]
+    d = scene.position[pairs[:, 1]] - scene.position[pairs[:, 0]]
+    length = model.box_length[w]
+    wrapped = np.divide(d, length, out=np.zeros_like(d), where=length > 0)
+    return np.linalg.norm(d - length * np.round(wrapped), axis=1)
+
+
+def colors(index: np.ndarray) -> np.ndarray:
+    """A colour for each tuple so that tuples of one colour share no particle (greedy).
+
+    Tuples take the lowest colour that none of their particles has yet, in order; worlds do not
+    share particles, so a world's colours are what they are alone.
+    """
+    used: dict[int, int] = {}
+    result = np.zeros(len(index), dtype=np.int32)
+    for row, particles in enumerate(index.tolist()):
+        taken = 0
+        for particle in particles:
+            taken |= used.get(particle, 0)
+        free = ~taken & (taken + 1)
+        result[row] = free.bit_length() - 1
+        for particle in particles:
+            used[particle] = used.get(particle, 0) | free
+    return result

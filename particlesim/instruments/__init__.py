@@ -1,0 +1,1 @@
+"""Instruments: what is measured of a simulation, and what watches over it."""

@@ -1,0 +1,88 @@
+"""Conserved quantities of every world, summed on the device when asked for."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import warp as wp
+
+from ..engine.execution.launch import launch
+from ..kernels.engine.reduce import QUANTITIES, block_sums_kernel
+
+if TYPE_CHECKING:
+    from ..simulation.simulation import Simulation
+
+BLOCK = 256  # particles summed by one thread
+
+
+@dataclass(frozen=True)
+class Diagnostics:
+    """Sums over the particles of each world, float64.
+
+    mass (worlds,), momentum (worlds, 3) and angular_momentum about the origin (worlds, 3);
+    kinetic and potential energy, their sum ``energy``, and the virial sum of r.F over pairs,
+    (worlds,). Pinned particles count in the mass and the potential energy only.
+    """
+
+    mass: np.ndarray
+    momentum: np.ndarray
+    angular_momentum: np.ndarray
+    kinetic: np.ndarray
+    potential: np.ndarray
+    virial: np.ndarray
+
+    @property
+    def energy(self) -> np.ndarray:
+        """Kinetic plus potential energy."""
+        return self.kinetic + self.potential
+
+
+def measure(sim: Simulation, potentials: list[np.ndarray] | None = None) -> Diagnostics:
+    """The diagnostics of the simulation's present state.
+
+    Args:
+        sim: The simulation.
+        potentials: If given, gets the potential energy of each interaction, (worlds,).
+    """
+    model, state, device = sim.model, sim.state, sim.model.device
+    state.require({"mass", "inverse_mass"})
+    energy = wp.zeros(model.particle_count, dtype=wp.float64, device=device)
+    virial = wp.zeros_like(energy)
+    sim.neighbors.update(state)
+    sim.neighbors.grow()
+    for interaction in sim.interactions:
+        before = energy.numpy().copy() if potentials is not None else None
+        interaction.measure(state, energy, virial)
+        if potentials is not None:
+            own = energy.numpy() - before
+            potentials.append(np.bincount(model.world_of, own, model.world_count))
+    begin, end, world = blocks(model.offsets)
+    sums = wp.zeros((len(begin), QUANTITIES), dtype=wp.float64, device=device)
+    launch(
+        block_sums_kernel(model.precision),
+        len(begin),
+        [
+            model.array(begin, wp.int32), model.array(end, wp.int32), state.position,
+            state.velocity, state.mass, state.inverse_mass, energy, virial, sums,
+        ],
+        device,
+    )  # fmt: skip
+    total = np.zeros((model.world_count, QUANTITIES))
+    np.add.at(total, world, sums.numpy())
+    return Diagnostics(
+        total[:, 0], total[:, 1:4], total[:, 4:7], total[:, 7], total[:, 8], total[:, 9]
+    )
+
+
+def blocks(offsets: np.ndarray, size: int = BLOCK) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Begin, end and world of the blocks; they start anew in each world."""
+    begin, end, world = [], [], []
+    for w, (start, stop) in enumerate(itertools.pairwise(offsets)):
+        edges = np.arange(start, stop, size)
+        begin.append(edges)
+        end.append(np.minimum(edges + size, stop))
+        world.append(np.full(len(edges), w))
+    return np.concatenate(begin), np.concatenate(end), np.concatenate(world)

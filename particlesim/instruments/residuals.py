@@ -1,0 +1,84 @@
+"""By how much the constraints of a simulation are missed."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from ..constraints.boundary_base import Boundary
+from ..constraints.constraint import Constraint
+from ..constraints.contact import Contact
+from ..engine.execution.launch import launch
+from ..kernels.constraints.rigid_motion import pose_kernel
+from ..kernels.instruments import residual as kernels
+
+if TYPE_CHECKING:
+    from ..simulation.simulation import Simulation
+
+
+def residuals(constraint: Any, sim: Simulation) -> tuple[np.ndarray, np.ndarray] | None:
+    """By how much a constraint is missed at the present positions.
+
+    Args:
+        constraint: One of ``sim.constraints``.
+        sim: The simulation; the constraints' neighbour lists are up to date.
+
+    Returns:
+        (values, worlds), one a row: C of each tuple [C], where an inequality counts below 0 only
+        and a broken tuple not at all; how deep each particle is in a boundary, or in the particle
+        it overlaps most [length]. None: not known for this kind.
+    """
+    return _residuals(constraint, sim)
+
+
+@functools.singledispatch
+def _residuals(constraint: Any, sim: Simulation) -> tuple[np.ndarray, np.ndarray] | None:
+    return None
+
+
+@_residuals.register(Constraint)
+def _of_tuples(constraint: Constraint, sim: Simulation) -> tuple[np.ndarray, np.ndarray] | None:
+    if not constraint.count:
+        return None
+    model, tuples = sim.model, constraint.tuples
+    kernel = kernels.tuples_kernel(
+        constraint.evaluation(model, tuples.Item), model.precision, model.periodic,
+        "position_error" in sim.state, tuples.size, tuples.Item, constraint.relative,
+    )  # fmt: skip
+    inputs = [model.box, constraint.struct, constraint.bodies]
+    return _run(kernel, constraint.count, inputs, sim), tuples.world
+
+
+@_residuals.register(Boundary)
+def _of_boundary(constraint: Boundary, sim: Simulation) -> tuple[np.ndarray, np.ndarray] | None:
+    if not constraint.count:
+        return None
+    model = sim.model
+    if constraint.moving:
+        inputs = [constraint.motion, constraint.clock, constraint.held.pose]
+        launch(pose_kernel(model.precision), model.world_count, inputs, model.device)
+    kernel = kernels.boundary_kernel(
+        constraint.shape, model.precision, constraint.Params, "position_error" in sim.state,
+        constraint.moving,
+    )  # fmt: skip
+    inputs = [constraint.params, constraint.held, constraint.bodies]
+    return _run(kernel, constraint.count, inputs, sim), constraint.held.world.numpy()
+
+
+@_residuals.register(Contact)
+def _of_contacts(constraint: Contact, sim: Simulation) -> tuple[np.ndarray, np.ndarray] | None:
+    if not constraint.count:
+        return None
+    model, pairs = sim.model, constraint.pairs.pairs
+    kernel = kernels.contact_kernel(model.precision, model.periodic)
+    inputs = [pairs, model.box, constraint.bodies, constraint.radius]
+    return _run(kernel, constraint.count, inputs, sim), pairs.world.numpy()
+
+
+def _run(kernel: wp.Kernel, count: int, inputs: list[Any], sim: Simulation) -> np.ndarray:
+    out = wp.zeros(count, dtype=sim.model.precision.scalar, device=sim.device)
+    launch(kernel, count, [*inputs, out], sim.device)
+    return out.numpy().astype(np.float64)

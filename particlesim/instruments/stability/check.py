@@ -1,0 +1,107 @@
+"""Stability of a simulation: asked for, warned of, and obeyed."""
+
+from __future__ import annotations
+
+import math
+import warnings
+import weakref
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from ... import validate
+from ...engine.probing.probe import Probe
+from ...scene.settings import AUTO
+from .report import Limit, Stability, explicit_step
+from .start import misfit
+
+if TYPE_CHECKING:
+    from ...scene.scene import Scene
+    from ...scene.settings import Settings
+    from ...simulation.simulation import Simulation
+
+PROVISIONAL = 1.0 / 60.0  # a frame's time while it is yet to be found
+NEGLIGIBLE = 0.97  # of the tightest limit: what several parts do together matters below it
+
+_checked: weakref.WeakSet[Simulation] = weakref.WeakSet()
+
+
+class StabilityWarning(UserWarning):
+    """Settings are past the limit of a scene."""
+
+
+def stability(sim: Simulation, quick: bool = False) -> Stability:
+    """The limits of all parts at the present moment (see ``Simulation.stability``).
+
+    ``quick``: limits that the settings surely keep may be smaller than they are.
+    """
+    limits: list[Limit] = []
+    if sim.particle_count:
+        with Probe(sim, quick) as probe:
+            for part in [*sim.interactions, *sim.constraints]:
+                limits += part.limits(probe)
+            limits += _together(probe, limits)
+    return Stability(sorted(limits, key=lambda limit: limit.dt), sim.settings)
+
+
+def _together(probe: Probe, limits: list[Limit]) -> list[Limit]:
+    """Several forces on the same particles are stiffer than each: their sum, if it matters.
+
+    The largest eigenvalue of a sum is at most the sum of the largest eigenvalues, so often there
+    is nothing to ask.
+    """
+    parts = [part for part, _, _ in probe.rates]
+    bound = explicit_step(
+        sum(omega_squared for _, omega_squared, _ in probe.rates),
+        sum(gamma for _, _, gamma in probe.rates),
+    )
+    tightest = min((limit.dt for limit in limits), default=math.inf)
+    if len(parts) < 2 or bound > NEGLIGIBLE * tightest:
+        return []
+    return probe.together(parts)
+
+
+def warn_if_past(sim: Simulation) -> None:
+    """Warn, once a simulation, if its settings are past the limit, or its start does not fit."""
+    if sim in _checked or not sim.settings.dt > 0:
+        return
+    _checked.add(sim)
+    if said := misfit(sim):
+        warnings.warn(said, StabilityWarning, stacklevel=3)
+    if stability(sim, quick=True).safe:
+        return
+    report = stability(sim)
+    if report.safe or report.binding is None:
+        return
+    limit = report.binding
+    remedy = "look at what pushes it"
+    if math.isfinite(report.substeps):
+        remedy = f"use Settings(substeps={report.substeps}) or more"
+    warnings.warn(
+        f"Simulation: substep must be at most {limit.dt:.3g} s for {limit.part} ({limit.kind}: "
+        f"{limit.reason}{', ' * bool(limit.where)}{limit.where}), got "
+        f"{sim.settings.substep:.3g} s; {remedy}.",
+        StabilityWarning,
+        stacklevel=3,
+    )
+
+
+def automatic(scenes: Sequence[Scene], settings: Settings, device: Any) -> Settings:
+    """The settings with dt or substeps chosen by the limit of the start, times ``safety``.
+
+    Raises:
+        ValueError: Nothing limits the substep, or nothing is small enough.
+    """
+    from ...simulation.simulation import Simulation
+
+    of_frame = settings.dt == AUTO
+    name = "dt" if of_frame else "substeps"
+    trial = settings.replace(dt=PROVISIONAL) if of_frame else settings.replace(substeps=1)
+    limit = settings.safety * stability(Simulation(scenes, trial, device)).dt
+    if not 0.0 < limit < math.inf:
+        what = "no part limits it" if limit else "the forces are not finite at the start"
+        raise validate.fail(
+            "Settings", name, f"be a number in a scene where {what}", AUTO, "give one"
+        )
+    if of_frame:
+        return settings.replace(dt=settings.substeps * limit)
+    return settings.replace(substeps=max(1, math.ceil(settings.dt / limit * (1.0 - 1e-9))))

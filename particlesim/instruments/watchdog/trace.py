@@ -1,0 +1,148 @@
+"""Trace: go through a failed frame once more, slowly, and see who did it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...engine.observers import FORCE, Observer
+from .limits import FAST, FINITE
+
+if TYPE_CHECKING:
+    from ...simulation.simulation import Simulation
+
+
+SHARE = 0.1  # of its velocity that a part must have added within the substep to have done it
+
+
+@dataclass
+class Culprit:
+    """The first wrong particle of a world: row of the arrays, substep (from 0), part."""
+
+    world: int
+    kind: int
+    row: int
+    substep: int
+    position: np.ndarray
+    velocity: np.ndarray
+    part: str | None = None
+
+
+def survey(sim: Simulation, substep: int, kinds: dict[int, int] | None = None) -> list[Culprit]:
+    """The worlds that are wrong at present, each with its first, or fastest, wrong particle.
+
+    Args:
+        sim: The simulation.
+        substep: Which one has just ended.
+        kinds: Look only at these worlds, and only for this; None: at all, for anything.
+    """
+    x, v, model = sim.position, sim.velocity, sim.model
+    wrong = sim.watchdog.limits.wrong(x, v, model.world_of)
+    found = []
+    for w in np.unique(model.world_of[wrong > 0]).tolist() if kinds is None else kinds:
+        begin, end = int(model.offsets[w]), int(model.offsets[w + 1])
+        mine = wrong[begin:end]
+        kind = int(mine[mine > 0].min(initial=FAST)) if kinds is None else kinds[w]
+        hits = mine == kind
+        if not hits.any():
+            continue
+        speed = np.where(hits, np.abs(v[begin:end]).max(axis=1), -1.0)
+        row = begin + int(np.argmax(hits if kind == FINITE else speed))
+        found.append(Culprit(w, kind, row, substep, x[row].copy(), v[row].copy()))
+    return found
+
+
+def trace(sim: Simulation, culprits: list[Culprit], substeps: int) -> list[Culprit]:
+    """Who first did what is wrong at the end of a frame; leaves the state of its start.
+
+    Args:
+        sim: The simulation.
+        culprits: As surveyed at the end of the frame.
+        substeps: Of the frame that failed.
+    """
+    dt = sim.settings.dt / substeps
+    found = {each.world: each for each in culprits}
+    pending = {each.world: each.kind for each in culprits}
+    sim.snapshot.restore()
+    for k in range(substeps):
+        sim.substep(dt)
+        for each in survey(sim, k, pending):
+            found[each.world] = each
+            del pending[each.world]
+        if not pending:
+            break
+    sim.snapshot.restore()
+    for k in range(1 + max(each.substep for each in found.values())):
+        now = [each for each in found.values() if each.substep == k]
+        if not now:
+            sim.substep(dt)
+            continue
+        fused, sim.passes = sim.passes, sim.interactions  # one by one
+        with sim.observers.watching(_Look(sim, now, dt)):
+            sim.substep(dt)
+        sim.passes = fused
+    sim.snapshot.restore()
+    return [found[w] for w in sorted(found)]
+
+
+class _Look(Observer):
+    """Looks around every part of one substep at what it does to the worlds that fail in it.
+
+    What is not finite is laid to the part after which it first is. What moves the particle without
+    being infinite itself is laid to the part that adds most to its velocity.
+    """
+
+    def __init__(self, sim: Simulation, pending: list[Culprit], dt: float):
+        self.sim, self.dt, self.pending = sim, dt, pending
+        self.open = {each.world: each for each in pending if each.kind == FINITE}
+        self.pushes: list[dict[str, np.ndarray]] = [{} for _ in pending]
+
+    def before(self, part: Any, stage: str) -> None:
+        self._see(None, ("position", "velocity"))  # what the motion itself has done
+        self.start = [self._push(each.row) for each in self.pending]
+
+    def after(self, part: Any, stage: str) -> None:
+        self._see(part.name, ("force",) if stage == FORCE else ("position", "velocity"))
+        with np.errstate(invalid="ignore", over="ignore"):
+            for each, start, mine in zip(self.pending, self.start, self.pushes, strict=True):
+                mine[part.name] = mine.get(part.name, 0.0) + self._push(each.row) - start
+
+    def end(self, dt: float) -> None:
+        for each, mine in zip(self.pending, self.pushes, strict=True):
+            sizes = {name: _size(push) for name, push in mine.items()}
+            most = max(sizes, key=lambda name: sizes[name], default=None)
+            enough = 0.0 if each.kind == FINITE else SHARE * _size(each.velocity)
+            if each.part is None and most and sizes[most] > enough:
+                each.part = most
+
+    def _push(self, row: int) -> np.ndarray:
+        """The velocity of a particle with what its present force and correction will add."""
+        state, dt = self.sim.state, self.dt
+        u = state.velocity[row : row + 1].numpy()[0].astype(np.float64)
+        if "force" in state:
+            w = float(state.inverse_mass[row : row + 1].numpy()[0])
+            u = u + state.force[row : row + 1].numpy()[0].astype(np.float64) * w * dt
+        if "correction" in state:
+            u = u + state.correction[row : row + 1].numpy()[0].astype(np.float64) / dt
+        return u
+
+    def _see(self, part: str | None, names: tuple[str, ...]) -> None:
+        """Note the worlds in which something is no longer finite, and that ``part`` did it."""
+        if not self.open:
+            return
+        arrays = [self.sim.get(name) for name in names]
+        for w, culprit in list(self.open.items()):
+            rows = self.sim.world(w).rows
+            if not all(np.isfinite(each[rows]).all() for each in arrays):
+                del self.open[w]
+                culprit.part = part
+
+
+def _size(velocity: np.ndarray) -> float:
+    """Of a velocity, from 0 to the largest number; what is no number counts as that."""
+    largest = np.finfo(np.float64).max
+    return float(
+        np.nan_to_num(np.abs(velocity.astype(np.float64)), nan=largest, posinf=largest).max()
+    )

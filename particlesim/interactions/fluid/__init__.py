@@ -1,0 +1,1 @@
+"""Fluids by Smoothed Particle Hydrodynamics."""

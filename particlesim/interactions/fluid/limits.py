@@ -1,0 +1,109 @@
+"""Limits of SPH: sound with viscosity, and acceleration."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...instruments.stability.report import Limit, explicit_step
+from .smoothing import SUPPORT, Smoothing
+from .viscosities import ArtificialViscosity
+
+if TYPE_CHECKING:
+    from ...engine.probing.probe import Probe
+    from .sph import SPH
+
+ACCELERATION = 0.25
+ADVISED = 0.4  # of h / c, for accuracy (Monaghan 1992)
+POINTS = 400  # of quadratures over the support
+WAVENUMBERS = np.linspace(0.02, 8.0, 400)  # kappa = k h; k W_hat is largest near 1.8
+
+
+def fluid_limits(part: SPH, probe: Probe) -> list[Limit]:
+    """The tightest of both kinds over the fluid, at present densities, speeds and accelerations.
+
+    - sound: that of an oscillation omega = c max(k W_hat(k)) damped by gamma, where W_hat is the
+      Fourier transform of W: summing the density smooths a wave by W_hat, and the gradient of the
+      pressure again. Artificial viscosity damps by at most gamma = D (alpha c + 2 beta mu) / h
+      (:func:`damping`), mu being the speed at which the fastest meets a typical particle; that of
+      another viscosity is asked of its force.
+    - acceleration: 0.25 sqrt(h / |a|) (Monaghan 1992).
+    """
+    rows = part.pairs.members_host
+    if not len(rows):
+        return []
+    columns = part.columns(part.parameters)
+    each = {name: values[probe.model.world_of[rows]] for name, values in columns.items()}
+    h, c = each["smoothing_length"], part.sound_speeds(probe)
+    omega = c * steepest(part.smoothing, part.dimension) / h
+    gamma = _damping_rates(part, probe, each, c)
+    k = int(np.argmax(gamma + np.sqrt(gamma**2 + 4.0 * omega**2)))
+    reason = f"h = {h[k]:.4g}, c = {c[k]:.4g}, omega = {omega[k]:.4g} /s, gamma = {gamma[k]:.4g} /s"
+    dt = explicit_step(float(omega[k]) ** 2, float(gamma[k]))
+    if c[k] > 0 and (advised := ADVISED * h[k] / c[k]) < dt:
+        reason += f"; for accuracy {ADVISED} h / c = {advised:.3g} s is advised"
+    limits = [Limit(part.name, "sound", dt, reason, *probe.place(int(rows[k])))]
+    a = np.linalg.norm(probe.acceleration[rows], axis=1)
+    k = int(np.argmax(a / h))
+    if a[k] > 0:
+        reason = f"0.25 sqrt(h / a), h = {h[k]:.4g}, a = {a[k]:.4g}"
+        dt = ACCELERATION * float(np.sqrt(h[k] / a[k]))
+        limits.append(Limit(part.name, "acceleration", dt, reason, *probe.place(int(rows[k]))))
+    return limits
+
+
+def _damping_rates(
+    part: SPH, probe: Probe, each: dict[str, np.ndarray], c: np.ndarray
+) -> np.ndarray:
+    """gamma of every member."""
+    if part.viscosity is None:
+        return np.zeros_like(c)
+    if not isinstance(part.viscosity, ArtificialViscosity):
+        return np.full_like(c, probe.damping(part))
+    speed = probe.relative_speed(part.pairs.members_host)
+    meeting = speed.max() + np.sqrt((speed**2).mean())
+    strength = each["viscosity_alpha"] * c + 2.0 * each["viscosity_beta"] * meeting
+    return damping(part.smoothing, part.dimension) * strength / each["smoothing_length"]
+
+
+@functools.cache
+def steepest(smoothing: Smoothing, dimension: int) -> float:
+    """max of kappa W_hat(kappa), kappa = k h: the largest omega is that times c / h.
+
+    W_hat(k) = int W cos(k.x) d^dx, 1 at k = 0.
+    """
+    q, w = _samples(smoothing)
+    angles = WAVENUMBERS[:, None] * q
+    if dimension == 1:
+        shell = 2.0 * np.cos(angles)
+    elif dimension == 2:
+        turn = (np.arange(64) + 0.5) * np.pi / 64
+        shell = 2.0 * np.pi * q * np.cos(angles[..., None] * np.cos(turn)).mean(axis=-1)
+    else:
+        shell = 4.0 * np.pi * q**2 * np.sinc(angles / np.pi)
+    transform = (shell * w).sum(axis=1) * SUPPORT / POINTS
+    return float(np.abs(WAVENUMBERS * transform).max())
+
+
+@functools.cache
+def damping(smoothing: Smoothing, dimension: int) -> float:
+    """D of gamma = D (alpha c + 2 beta mu) / h, an upper bound by Gershgorin's circles.
+
+    A pair that approaches damps v_ij along x_ij at the rate m h (alpha c + 2 beta mu) |W'| / (rho
+    r). Summed over all neighbours, 1/d of each along a direction, twice for the row of the matrix:
+    D = 2/d int |W'| / r d^dx h^2, which by parts is an integral over W itself.
+    """
+    q, w = _samples(smoothing)
+    surface = {1: 2.0, 2: 2.0 * np.pi, 3: 4.0 * np.pi}[dimension]
+    slope = np.abs(np.gradient(w, q))
+    return float(
+        2.0 / dimension * surface * (slope * q ** (dimension - 2)).sum() * SUPPORT / POINTS
+    )
+
+
+def _samples(smoothing: Smoothing) -> tuple[np.ndarray, np.ndarray]:
+    """Midpoints q and W h^d there."""
+    q = (np.arange(POINTS) + 0.5) * SUPPORT / POINTS
+    return q, smoothing.sigma * np.array([float(smoothing.weight(float(each))) for each in q])

@@ -1,0 +1,315 @@
+"""Smoothed particle hydrodynamics: a fluid of particles that carry mass and density."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from ... import validate
+from ...engine.execution.launch import launch
+from ...engine.neighbors.lists import Neighbors
+from ...engine.neighbors.verlet import VerletList
+from ...kernels.interactions import sph as kernels
+from ...kernels.interactions.pair import pair_kernel
+from ..base import Interaction
+from ..pair import filled, structure_of
+from .equations_of_state import EquationOfState
+from .interpolation import interpolate
+from .smoothing import SMOOTHING, SUPPORT
+from .viscosities import Viscosity
+
+if TYPE_CHECKING:
+    from ...engine.model import Model
+    from ...engine.probing.probe import Probe
+    from ...engine.state import State
+    from ...instruments.stability.report import Limit
+
+# What laws may name beside smoothing_length, rest_density and the parameters of their part.
+VARIABLES = {
+    "pressure": ("density",),
+    "energy": ("density",),
+    "sound_speed": ("density", "pressure"),
+    "term": ("approach", "distance_squared", "density", "sound_speed"),
+}
+COINCIDENT = 1e-6  # closer than this, in parts of h, particles count as coincident
+
+
+class SPH(Interaction):
+    r"""A barotropic fluid: density by summation, symmetric pressure force, viscosity.
+
+        rho_i = sum_j m_j W_ij                    (over all j within 2 h, i itself included)
+        F_ij = -m_i m_j (P_i/rho_i^2 + P_j/rho_j^2 + Pi_ij) grad_i W_ij
+
+    with W_ij = W(|x_i - x_j|, h) (Gingold and Monaghan 1977; Monaghan 1992, eq. 3.3). The pressure
+    force is the exact gradient of the energy sum_i m_i u(rho_i), so that momentum and angular
+    momentum are conserved to round-off and the energy to the integrator's order; viscosity takes
+    energy out. Coincident particles are pushed apart, equally and opposite.
+
+    The step is bounded by the time of sound across a smoothing length and by the acceleration
+    (Monaghan 1992, on time stepping): dt < 0.4 h / (c (1 + 0.6 alpha)) and dt < 0.25 sqrt(h / |a|).
+
+    State arrays ``density`` and ``pressure`` belong to the positions at which the forces were
+    taken last.
+
+    Args:
+        group: The fluid's particles; None: all. Pinned ones count in the sums and stay.
+        smoothing_length: h [length], above 0. W has the support 2 h, whichever the function: at
+            a spacing s of particles, h = 2 s makes 268 neighbours, 1.3 s makes 74, s makes 33.
+        rest_density: rho0 [mass/length^d], where the equation of state asks for it.
+        equation_of_state: :class:`Tait`, :class:`Polytrope` or another ``EquationOfState``.
+        smoothing: ``"wendland_c2"`` (Wendland 1995; does not clump at many neighbours) or
+            ``"cubic_spline"`` (Monaghan and Lattanzio 1985; sharper at few).
+        viscosity: :class:`ArtificialViscosity` or another ``Viscosity``; None: inviscid.
+        dimension: d of the normalisation of W: 3; 2 for scenes in a plane, whose density is a mass
+            per area; 1 for scenes on a line. The plane is x-y and the line x where coincident
+            particles are to stay in it.
+
+    Raises:
+        ValueError: A value out of range, a name that is not known, a rest density missing.
+
+    Example:
+        >>> from particlesim import Scene, Settings, Simulation, Tait, sample
+        >>> scene = Scene()
+        >>> block = sample.box((0, 0, 0), (1, 1, 1), spacing=0.1)
+        >>> water = scene.add_particles(block, mass=1000 * 0.1**3)
+        >>> fluid = scene.add_interaction(
+        ...     SPH(water, smoothing_length=0.2, rest_density=1000.0,
+        ...         equation_of_state=Tait(sound_speed=30.0)))
+        >>> sim = Simulation(scene, Settings(dt=1 / 60, substeps=20), device="cpu")
+        >>> fluid.interpolate([(0.5, 0.5, 0.5)], "density").round(-2).tolist()
+        [1000.0]
+    """
+
+    requires = frozenset({"force", "velocity", "mass", "density", "pressure"})
+
+    def __init__(
+        self,
+        group: Any = None,
+        *,
+        smoothing_length: float,
+        equation_of_state: EquationOfState,
+        rest_density: float | None = None,
+        smoothing: str = "wendland_c2",
+        viscosity: Viscosity | None = None,
+        dimension: int = 3,
+    ):
+        self.group = group
+        h = validate.number(
+            self.name, "smoothing_length", smoothing_length, above=0.0, unit="length"
+        )
+        self.cutoff = SUPPORT * h
+        self.equation_of_state = _of_kind(
+            self.name, "equation_of_state", equation_of_state, EquationOfState,
+            "Tait(sound_speed)",
+        )  # fmt: skip
+        self.viscosity = viscosity
+        if viscosity is not None:
+            _of_kind(self.name, "viscosity", viscosity, Viscosity, "ArtificialViscosity(0.05)")
+        validate.choice(self.name, "smoothing", smoothing, SMOOTHING)
+        functions = SMOOTHING[smoothing]
+        if dimension not in functions:
+            raise validate.fail(
+                self.name, "dimension", "be 1, 2 or 3", dimension, "choose one of these"
+            )
+        self.dimension, self.smoothing = dimension, functions[dimension]
+        self.parameters: dict[str, Any] = {"smoothing_length": h}
+        if rest_density is not None:
+            self.parameters["rest_density"] = validate.number(
+                self.name, "rest_density", rest_density, above=0.0, unit="mass/length^d"
+            )
+        self.sources: dict[str, dict[str, str]] = {}
+        self._take("state", equation_of_state)
+        if viscosity is not None:
+            self._take("viscosity", viscosity)
+
+    def _take(self, prefix: str, part: EquationOfState | Viscosity) -> None:
+        """Note what fills the arguments of a part's laws; its parameters join the fluid's."""
+        own = {name: f"p.{name}" for name in ("smoothing_length", "rest_density")}
+        for name, value in part.parameters.items():
+            self.parameters[f"{prefix}_{name}"] = value
+            own[name] = f"p.{prefix}_{name}"
+        for name, law in part.laws.items():
+            sources = own | {variable: variable for variable in VARIABLES[name]}
+            validate.known(part.name, law.parameters, sources, f"argument of {law.name}")
+            if "rest_density" in law.parameters and "rest_density" not in self.parameters:
+                raise validate.fail(
+                    self.name, "rest_density", "be given [mass/length^d]", None,
+                    f"{part.name} asks for it",
+                )  # fmt: skip
+            self.sources[name] = sources
+
+    def kind(self) -> tuple[Any, ...]:
+        parts = [self.equation_of_state, *([self.viscosity] if self.viscosity else [])]
+        laws = [law.func for part in parts for law in part.laws.values()]
+        return (type(self), *laws, self.smoothing, self.dimension, tuple(self.parameters))
+
+    def prepare(self, model: Model, neighbors: Neighbors) -> None:
+        self.model = model
+        members = model.members([peer.group for peer in self.peers], self.name)
+        columns = self.columns(self.parameters)
+        h = columns["smoothing_length"]
+        names = {"position", "mass"} | ({"velocity"} if self.viscosity else set())
+        pairs = neighbors.request(self.name, members, SUPPORT * h, names)
+        assert isinstance(pairs, VerletList)  # as there is a cutoff
+        self.pairs = pairs
+        columns["inverse_h"] = 1.0 / h
+        with np.errstate(divide="ignore", over="ignore", under="ignore"):
+            columns["sigma"] = self.smoothing.sigma / h**self.dimension
+        columns["cutoff_squared"] = (SUPPORT * h) ** 2
+        columns["closest_squared"] = (COINCIDENT * h) ** 2
+        self._check_range(columns)
+        self.Params, self.params = model.parameters("FluidParameters", columns)
+
+    def _check_range(self, columns: dict[str, np.ndarray]) -> None:
+        """Powers of h must be normal numbers of the precision."""
+        limits = np.finfo(self.model.precision.numpy)
+        for name in ("sigma", "closest_squared"):
+            bad = ~((columns[name] > limits.tiny) & (columns[name] < limits.max))
+            if bad.any():
+                raise validate.fail(
+                    self.name, "smoothing_length",
+                    f"have h^2 and h^-{self.dimension} within {limits.dtype}",
+                    float(columns["smoothing_length"][np.argmax(bad)]),
+                    "choose another unit of length, or precision=\"float64\"",
+                )  # fmt: skip
+
+    def attach(self, model: Model, state: State) -> None:
+        precision, own = model.precision, self.pairs.fields
+        # Mass, density, P / rho^2 and sound speed of each slot, together as they are read together.
+        self.slot_state = self.pairs.array(precision.vector(4))
+        fields = {"x": own["position"], "m": own["mass"], "state": self.slot_state}
+        if self.viscosity is not None:
+            fields["v"] = own["velocity"]
+        self.Data = structure_of("FluidData", fields)
+        self.data = filled(self.Data, fields)
+        self.state = state
+        self._attach_density(state)
+        self._attach_force(state)
+
+    def _attach_density(self, state: State) -> None:
+        precision = self.model.precision
+        out = {"state": self.slot_state, "rho": state.density, "pressure": state.pressure}
+        self.DensityOut, self.density_out = self._out("FluidStates", out)
+        self.weight = self.smoothing.weight.function(precision)
+        sounds = self.viscosity is not None
+        sound_speed = self._law(self.equation_of_state, "sound_speed") if sounds else None
+        self.density_kernel = self._density_kernel(sound_speed)
+
+    def _density_kernel(self, sound_speed: wp.Function | None) -> wp.Kernel:
+        precision = self.model.precision
+        term = kernels.density_term(self.weight, precision, self.Data, self.Params)
+        store = kernels.keep_state(
+            self.weight, self._law(self.equation_of_state, "pressure"), sound_speed, precision,
+            self.Data, self.Params, self.DensityOut,
+        )  # fmt: skip
+        return self._kernel(term, store, self.DensityOut, 1)
+
+    def _attach_force(self, state: State) -> None:
+        precision = self.model.precision
+        Out, self.force_out = self._out("FluidForces", {"f": state.force})
+        viscosity = self._law(self.viscosity, "term") if self.viscosity else None
+        self.force_term = kernels.force_term(
+            self.smoothing.slope.function(precision), viscosity, self.dimension, precision,
+            self.Data, self.Params,
+        )  # fmt: skip
+        store = kernels.add_force(precision, self.Data, self.Params, Out)
+        self.force_kernel = self._kernel(self.force_term, store, Out, 3)
+
+    def _law(self, part: EquationOfState | Viscosity, name: str) -> Any:
+        """A law of a part as a function of its variables and the fluid's parameters."""
+        precision = self.model.precision
+        return kernels.bound_law(
+            name, part.laws[name].function(precision), VARIABLES[name], self.sources[name],
+            precision, self.Params,
+        )  # fmt: skip
+
+    def _out(self, name: str, fields: dict[str, wp.array]) -> tuple[Any, Any]:
+        kind = structure_of(name, fields)
+        return kind, filled(kind, fields)
+
+    def _kernel(self, term: Any, store: Any, out: Any, width: int) -> Any:
+        model = self.model
+        return pair_kernel(
+            term, store, self.Data, self.Params, out, width, model.precision, model.periodic,
+            self.pairs.partners, vectorised=model.vectorised,
+        )  # fmt: skip
+
+    def _launch(self, kernel: Any, out: Any) -> None:
+        inputs = [self.pairs.pairs, self.model.box, self.params, self.data, out]
+        launch(kernel, self.pairs.count, inputs, self.model.device)
+
+    def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        self._launch(self.density_kernel, self.density_out)
+        self._launch(self.force_kernel, self.force_out)
+
+    def limits(self, probe: Probe) -> list[Limit]:
+        """By sound with viscosity, and by acceleration."""
+        from .limits import fluid_limits
+
+        return fluid_limits(self, probe)
+
+    def sound_speeds(self, probe: Probe) -> np.ndarray:
+        """Speed of sound at the present densities, of each member [length/time]."""
+        probe.force([self])
+        if self.viscosity is None:  # whose passes have no need of it
+            kernel = self._density_kernel(self._law(self.equation_of_state, "sound_speed"))
+            self._launch(kernel, self.density_out)
+        c = np.empty(self.pairs.count)
+        members = self.pairs.members_host
+        c[np.searchsorted(members, self.pairs.order.numpy())] = self.slot_state.numpy()[:, 3]
+        return c
+
+    def update_density(self) -> None:
+        """Density, pressure and their slots at the present positions; not within a substep."""
+        self.pairs.update(self.state)
+        self.pairs.grow()
+        self._launch(self.density_kernel, self.density_out)
+
+    def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
+        """Add the energy m u(rho) at the present positions, and the virial of all pair forces."""
+        self._launch(self.density_kernel, self.density_out)
+        precision = self.model.precision
+        Out, out = self._out("FluidMeasures", {"energy": energy, "virial": virial})
+        term = kernels.virial_term(self.force_term, precision, self.Data, self.Params)
+        store = kernels.keep_measure(
+            self._law(self.equation_of_state, "energy"), precision, self.Data, self.Params, Out
+        )
+        self._launch(self._kernel(term, store, Out, 1), out)
+
+    def interpolate(
+        self, points: Any, field: Any, *, world: int = 0, normalized: bool = False
+    ) -> np.ndarray:
+        """A field of the fluid anywhere: A(r) = sum_j m_j A_j / rho_j W(|r - r_j|, h).
+
+        (Monaghan 2005, sec. 2.) At the present positions of the simulation made last. Away from
+        the fluid it is 0; at a free surface it falls to 0 over 2 h, like the sum of the weights.
+
+        Args:
+            points: Where, (k, 3) [length].
+            field: ``"density"``, ``"velocity"`` or another array of the state or attribute of the
+                particles by name; or values, (n,) or (n, 3), of the fluid's particles in order or
+                of all particles of the world.
+            world: Whose fluid.
+            normalized: Divide by sum_j m_j / rho_j W (Shepard 1968), which makes constants exact
+                up to the surface.
+
+        Returns:
+            (k,) or (k, 3), float64.
+
+        Raises:
+            ValueError: Points or values of wrong shape or not finite, a world or name that is
+                not there.
+        """
+        return interpolate(self.bound, points, field, world, normalized)
+
+
+def _of_kind(owner: str, argument: str, value: Any, kind: type, example: str) -> Any:
+    """``value``, checked to be of this kind."""
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        raise TypeError(
+            f"{owner}: {argument} must be {article} {kind.__name__}, got {value!r}; give {example}."
+        )
+    return value

@@ -1,0 +1,1 @@
+"""Output: recordings, checkpoints, histories and surfaces in files."""

@@ -1,0 +1,278 @@
+"""Checkpoints: a simulation in one file, to go on from as if it had never stopped.
+
+The file is a NumPy archive (``.npz``, read without pickle) of a header, JSON in bytes, and of the
+arrays: ``state/<name>`` is the state's, ``kept/<name>`` what else the snapshot of a frame holds
+(the positions that neighbour rows were made from, broken links, slack) and ``read/<name>`` what
+constraints offer for reading. Rows of neighbours are made again from their positions, so that sums
+run in the same order and a restart equals the run that was not interrupted, bit for bit.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import os
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from .. import validate
+from ..engine import batch
+from ..instruments.watchdog.incident import Incident
+from ..scene.fingerprint import difference, fingerprint
+from ..scene.scene import Scene
+from ..scene.settings import Settings
+from . import files
+
+if TYPE_CHECKING:
+    import warp as wp
+
+    from ..simulation.simulation import Simulation
+
+Kind = TypeVar("Kind", bound="Simulation")
+FORMAT, VERSION = "particlesim checkpoint", 1
+HEADER = "header"
+# What the arrays mean depends on these: which there are, their type, and the time of a frame.
+FIXED = ("dt", "integrator", "precision", "compensated", "ledger")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Capture:
+    """A checkpoint on the host; it shares nothing with the simulation."""
+
+    header: dict[str, Any]
+    arrays: dict[str, np.ndarray]
+
+
+def save(sim: Simulation, path: str | os.PathLike[str], overwrite: bool) -> None:
+    """Write the present of ``sim`` (see :meth:`Simulation.save`)."""
+    target = _writable(path, overwrite)
+    _publish(target, capture(sim))
+
+
+def capture(sim: Simulation, scenes: dict[str, Any] | None = None, state: bool = True) -> Capture:
+    """Copy what a checkpoint holds.
+
+    Args:
+        sim: The simulation.
+        scenes: Its fingerprint, if it is known: it does not change.
+        state: False leaves the arrays out, for a run that is at its start.
+    """
+    from .. import __version__
+
+    held = contents(sim) if state else {}
+    arrays = {name: array.numpy().copy() for name, array in held.items()}
+    header = {
+        "format": FORMAT,
+        "format_version": VERSION,
+        "particlesim": __version__,
+        "frame": sim.frame,
+        "unknown_forces": sorted(sim._unknown_forces),
+        "frozen": sim.frozen,
+        "incidents": [dataclasses.asdict(incident) for incident in sim.incidents],
+        "settings": dataclasses.asdict(sim.settings),
+        "copies": all(scene is sim.scenes[0] for scene in sim.scenes),
+        "scenes": fingerprint(sim.scenes) if scenes is None else scenes,
+        "arrays": list(arrays),
+    }
+    return Capture(header, arrays)
+
+
+def write(capture: Capture, path: Path) -> None:
+    """Write a captured checkpoint in the place of the one before; touches no simulation."""
+    _publish(path, capture)
+
+
+def read(path: Path) -> Capture:
+    """What a file holds.
+
+    Raises:
+        ValueError: It is damaged, newer or no checkpoint. OSError: It cannot be read.
+    """
+    return Capture(*_read(path))
+
+
+def restore(sim: Simulation, saved: Capture, source: Path) -> None:
+    """Put ``sim``, of the same scenes and settings, to where a checkpoint was captured."""
+    _fill(sim, saved.arrays, source)
+    sim.frame = saved.header["frame"]
+    sim._unknown_forces = set(saved.header["unknown_forces"])
+    sim.incidents = [Incident.of_saved(each) for each in saved.header.get("incidents", ())]
+    sim.watchdog.resume(sim, saved.header.get("frozen", ()))
+
+
+def load(
+    kind: type[Kind],
+    path: str | os.PathLike[str],
+    scene: Scene | Sequence[Scene],
+    settings: Settings | None,
+    device: Any,
+    worlds: int | None,
+) -> Kind:
+    """The simulation that a file holds (see :meth:`Simulation.load`)."""
+    source = Path(path)
+    saved = read(source)
+    header = saved.header
+    if not saved.arrays:
+        raise validate.fail(
+            "Simulation.load", "path", "be a checkpoint with a state", str(source),
+            "this one says only how a run was started; start it anew",
+        )  # fmt: skip
+    if isinstance(scene, Scene) and worlds is None and header["copies"]:
+        worlds = len(header["scenes"]["worlds"])
+    scenes = batch.scenes(scene, worlds)
+    found = difference(header["scenes"], fingerprint(scenes))
+    if found:
+        where, saved, given = found
+        raise validate.fail(
+            "Simulation.load", where, f"be as in {source.name!r}, {_short(saved)}", given,
+            "give the scenes that were saved",
+        )  # fmt: skip
+    sim = kind(scenes, _settings(source, header["settings"], settings), device)
+    restore(sim, saved, source)
+    return sim
+
+
+def contents(sim: Simulation) -> dict[str, wp.array]:
+    """The arrays that a checkpoint holds, by their names in the file."""
+    state = sim.state.arrays
+    found = {f"state/{name}": array for name, array in state.items() if name != "world"}
+    for name, array in sim.snapshot.arrays.items():
+        if state.get(name) is not array:
+            found[f"kept/{name}"] = array
+    for k, constraint in enumerate(sim.constraints):
+        for name, array in constraint.readable().items():
+            found[f"read/constraint_{k}_{name}"] = array
+    return found
+
+
+def _settings(source: Path, saved: dict[str, Any], given: Settings | None) -> Settings:
+    """The settings to go on with: those of the file, or ``given`` if the arrays fit them."""
+    known = {field.name for field in dataclasses.fields(Settings)}
+    if not known >= saved.keys():
+        raise _unfit(source, f"has the unknown knobs {sorted(saved.keys() - known)}")
+    settings = Settings(**saved)
+    if given is None:
+        return settings
+    if not isinstance(given, Settings):
+        raise TypeError(
+            f"Simulation.load: settings must be a Settings, got {given!r}; use Settings(...)."
+        )
+    if given.automatic:
+        given = given.replace(dt=settings.dt, substeps=settings.substeps)
+    for name in FIXED:
+        before, now = getattr(settings, name), getattr(given, name)
+        if now != before:
+            raise validate.fail(
+                "Simulation.load", f"settings.{name}", f"be {before!r} as in {source.name!r}", now,
+                f"change other knobs than {', '.join(FIXED)}",
+            )  # fmt: skip
+    return given
+
+
+def _fill(sim: Simulation, arrays: dict[str, np.ndarray], source: Path) -> None:
+    """Put the arrays of a file into a simulation that is at its start."""
+    # Some arrays are made only when something asks for them, as the diagnostics do.
+    prefix = "state/"
+    sim.state.require(name.removeprefix(prefix) for name in arrays if name.startswith(prefix))
+    targets = contents(sim)
+    if targets.keys() != arrays.keys():
+        raise _unfit(source, f"differs in {sorted(targets.keys() ^ arrays.keys())}")
+    for name, target in targets.items():
+        here, there = target.numpy(), arrays[name]
+        if (here.shape, here.dtype) != (there.shape, there.dtype):
+            raise _unfit(
+                source, f"has {there.dtype} {there.shape} for {here.dtype} {here.shape} in {name}"
+            )
+        target.assign(there)
+    for each in sim.neighbors.verlet:
+        each.mark_all()
+        each.rebuild()
+        each.grow()
+
+
+def _unfit(source: Path, how: str) -> ValueError:
+    """The scene agrees, yet its arrays do not: the engine is another."""
+    return ValueError(
+        f"Simulation.load: path must be a checkpoint of this version of particlesim, got "
+        f"{str(source)!r}, which {how}; load it with the version that saved it."
+    )
+
+
+# The file ------------------------------------------------------------------------------------
+
+
+def _writable(path: str | os.PathLike[str], overwrite: bool) -> Path:
+    """``path``, checked before any work is done for it."""
+    owner, target = "Simulation.save", Path(path)
+    if target.suffix != ".npz":
+        raise validate.fail(
+            owner, "path", "end in .npz", str(target), f"name it {target.with_suffix('.npz').name}"
+        )
+    if not target.parent.is_dir():
+        raise FileNotFoundError(
+            f"{owner}: path must be in an existing folder, got {str(target)!r}; "
+            f"make {str(target.parent)!r} first."
+        )
+    if target.is_dir():
+        raise IsADirectoryError(
+            f"{owner}: path must be a file, got the folder {str(target)!r}; choose another name."
+        )
+    if target.exists() and not overwrite:
+        raise FileExistsError(
+            f"{owner}: path must be new, got {str(target)!r}, which exists; choose another, or "
+            "pass overwrite=True."
+        )
+    return target
+
+
+def _publish(target: Path, capture: Capture) -> None:
+    text = json.dumps(capture.header, default=lambda number: number.item()).encode()
+    arrays = {HEADER: np.frombuffer(text, np.uint8), **capture.arrays}
+    with files.whole("Simulation.save", target, "What was saved before is kept.") as temporary:
+        files.write_arrays(temporary, arrays, sync=True)
+
+
+def _read(source: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Header and arrays of a file, every byte of them checked."""
+    owner = "Simulation.load"
+    try:
+        file = open(source, "rb")  # noqa: SIM115, what fails within is told apart
+    except OSError as error:
+        raise type(error)(
+            f"{owner}: path must be a file that can be read, got {str(source)!r} "
+            f"({error.strerror}); check the path."
+        ) from error
+    with file:
+        try:
+            with zipfile.ZipFile(file) as archive:
+                header = json.loads(_entry(archive, f"{HEADER}.npy").tobytes())
+                if header["format"] != FORMAT:
+                    raise ValueError(f"format {header['format']!r}")
+                if header["format_version"] <= VERSION:
+                    names = header["arrays"]
+                    return header, {name: _entry(archive, f"{name}.npy") for name in names}
+        except Exception as error:  # bytes may be anything, and their readers raise as much
+            raise ValueError(
+                f"{owner}: path must be a whole checkpoint written by Simulation.save, got "
+                f"{str(source)!r} ({type(error).__name__}: {error}); take another file."
+            ) from error
+    raise ValueError(
+        f"{owner}: path must be a checkpoint of format {VERSION} or older, got format "
+        f"{header['format_version']} in {str(source)!r}; use particlesim "
+        f"{header.get('particlesim')} or newer."
+    )
+
+
+def _entry(archive: zipfile.ZipFile, name: str) -> np.ndarray:
+    """An array of the archive; reading it to its end has its checksum compared."""
+    return np.lib.format.read_array(io.BytesIO(archive.read(name)), allow_pickle=False)
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else text[:77] + "..."

@@ -1,0 +1,99 @@
+"""One moment of a history: what is conserved, and by how much densities and constraints are off."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from ...instruments.diagnostics import measure
+from ...instruments.residuals import residuals
+from ...interactions.fluid.sph import SPH
+
+if TYPE_CHECKING:
+    from ...simulation.simulation import Simulation
+
+
+def sample(sim: Simulation) -> dict[str, np.ndarray]:
+    """One row of a history: name to (worlds,), float64."""
+    with _undisturbed(sim):
+        potentials: list[np.ndarray] = []
+        total = measure(sim, potentials)
+        values = {"mass": total.mass}
+        for name in ("momentum", "angular_momentum"):
+            vectors = getattr(total, name)
+            values |= {f"{name}_{axis}": vectors[:, k] for k, axis in enumerate("xyz")}
+        values |= {name: getattr(total, name) for name in ("kinetic", "potential", "energy")}
+        for label, part, own in zip(
+            _labels(sim.interactions), sim.interactions, potentials, strict=True
+        ):
+            if getattr(part, "potential", part) is not None:  # a force alone has none
+                values[f"potential:{label}"] = own
+        for label, part in zip(_labels(sim.interactions), sim.interactions, strict=True):
+            if isinstance(part, SPH) and "rest_density" in part.parameters:
+                values |= _figures("density_error", label, *_density_error(part, sim), sim)
+        sim.neighbors.update_for_constraints(sim.state)
+        sim.neighbors.grow()
+        for label, constraint in zip(_labels(sim.constraints), sim.constraints, strict=True):
+            missed = residuals(constraint, sim)
+            if missed is not None:
+                values |= _figures("residual", label, np.abs(missed[0]), missed[1], sim)
+    return values
+
+
+def _labels(parts: Iterable[Any]) -> list[str]:
+    """A name for each, with a number where several have the same."""
+    labels: list[str] = []
+    for part in parts:
+        name, number = part.name, 1
+        while name in labels:
+            number += 1
+            name = f"{part.name} {number}"
+        labels.append(name)
+    return labels
+
+
+def _density_error(fluid: SPH, sim: Simulation) -> tuple[np.ndarray, np.ndarray]:
+    """rho / rho0 - 1 of the fluid's particles, and their worlds."""
+    members = fluid.pairs.members_host
+    world = sim.model.world_of[members]
+    rest = np.array([peer.parameters["rest_density"] for peer in fluid.peers])
+    density = sim.state.density.numpy()[members].astype(np.float64)
+    return density / rest[world] - 1.0, world
+
+
+def _figures(
+    name: str, label: str, values: np.ndarray, world: np.ndarray, sim: Simulation
+) -> dict[str, np.ndarray]:
+    """The largest and the root mean square of each world; 0 where there is none."""
+    count = np.bincount(world, minlength=sim.world_count)
+    largest = np.full(sim.world_count, -np.inf)
+    np.maximum.at(largest, world, values)
+    square = np.bincount(world, values**2, sim.world_count) / np.maximum(count, 1)
+    return {
+        f"{name}_max:{label}": np.where(count > 0, largest, 0.0),
+        f"{name}_rms:{label}": np.sqrt(square),
+    }
+
+
+@contextlib.contextmanager
+def _undisturbed(sim: Simulation) -> Iterator[None]:
+    """Put back what measuring renews: neighbour rows, whose order decides about rounding, and
+    densities, which belong to the last forces.
+    """
+    state = sim.state
+    kept = {name: wp.clone(state[name]) for name in ("density", "pressure") if name in state}
+    rows = [(each, wp.clone(each.x_listed)) for each in sim.neighbors.verlet]
+    try:
+        yield
+    finally:
+        for name, array in kept.items():
+            wp.copy(state[name], array)
+        for each, listed in rows:
+            if not np.array_equal(each.x_listed.numpy(), listed.numpy()):
+                wp.copy(each.x_listed, listed)
+                each.mark_all()
+                each.rebuild()

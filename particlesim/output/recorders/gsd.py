@@ -1,0 +1,156 @@
+"""GSD, the trajectory of HOOMD-blue: one file, read by OVITO."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import Any
+
+import numpy as np
+
+from .. import files
+from .base import ParticleFrame, ParticleRecorder
+from .gsd_layout import Extent, cut, last_frame
+
+KEPT = "Frames written before are kept."
+ARRAYS = 16  # at most, of the schema's own in a frame
+# What the schema has a place for; all else are logged quantities.
+KNOWN = {"position": "position", "velocity": "velocity", "group": "typeid"}
+
+
+class GsdRecorder(ParticleRecorder):
+    """Records frames into one GSD file (needs the extra ``gsd``).
+
+    Positions, velocities, groups (as types), masses and diameters are where the HOOMD schema has
+    them; ``log/particles/id``, ``/world`` and the fields beside, and ``log/time``. The box is the
+    periodic one; on an open axis it is as long as twice the start positions reach. Positions stay
+    as they are: HOOMD's box is around the origin, so that they may lie an image away.
+
+    A frame is appended at the end, and its data come before what leads to them. When the process
+    is killed, the frames whose write had returned can be read. A kill may leave a part of the next
+    one; it is found, and taken away, when the recording is resumed. Frames that are there already
+    are compared and kept.
+
+    Arguments are those of :class:`~particlesim.output.recorders.base.ParticleRecorder`.
+    """
+
+    suffix = ".gsd"
+
+    def __init__(self, *arguments: Any, **options: Any):
+        self._library = _gsd()
+        self._open: Any = None
+        self._first = 0
+        super().__init__(*arguments, **options)
+        self._box = self._whole_box()
+        self._mass = self.sim.model.column("mass")
+
+    def _begin(self, frame: ParticleFrame) -> None:
+        # Prepared under another name, since an empty file is not a trajectory.
+        with files.whole(self.owner, self.path, KEPT) as temporary:
+            self._library.open(str(temporary), "w", precision=self._precision).close()
+        self._first = frame.number
+        self._attach()
+
+    def _put(self, frame: ParticleFrame) -> None:
+        made = self._frame(frame)
+        self._attach()
+        place = frame.number - self._first
+        if place < len(self._open):
+            if self._has(place, made):
+                return
+            self._detach()
+            cut(self.path, place)
+            self._attach()
+        before = Extent.of(self.path, ARRAYS + len(made.log))
+        try:
+            self._open.append(made)
+            self._open.flush()
+            if last_frame(self.path) != place:  # the library tells of most failures, not of all
+                raise OSError("no room for what leads to the frame")
+        except (OSError, RuntimeError) as error:
+            with contextlib.suppress(OSError, RuntimeError):  # of what could not be written
+                self._detach()
+            before.restore(self.path)
+            cut(self.path, place)
+            raise OSError(
+                f"{self.owner}: {str(self.path)!r} must be writable, got {error}; free some space "
+                f"or choose another folder. {KEPT}"
+            ) from error
+
+    def _go_on(self, last: int) -> None:
+        if not self.path.is_file():
+            raise self._refuse_to_go_on("the file is missing")
+        try:
+            with self._library.open(str(self.path), "r") as file:
+                self._first = int(file[0].configuration.step) // self.every
+                found = int(file[last - self._first].configuration.step)
+        except (OSError, RuntimeError, IndexError, KeyError) as error:
+            raise self._refuse_to_go_on(f"frame {last} cannot be read ({error})") from error
+        if found != last * self.every:
+            raise self._refuse_to_go_on(f"frame {last} has another number")
+
+    def _finish(self) -> None:
+        self._detach()
+
+    @property
+    def _precision(self) -> str:
+        return "double" if self.sim.settings.precision == "float64" else "single"
+
+    def _attach(self) -> None:
+        if self._open is None:
+            self._open = self._library.open(str(self.path), "r+", precision=self._precision)
+
+    def _detach(self) -> None:
+        if self._open is not None:
+            self._open, file = None, self._open
+            file.close()
+
+    def _frame(self, frame: ParticleFrame) -> Any:
+        made, columns = self._library.Frame(), frame.columns
+        made.configuration.step = frame.number * self.every
+        made.configuration.box = self._box
+        particles = made.particles
+        particles.N = len(columns["position"])
+        particles.types = self.group_names
+        for name, place in KNOWN.items():
+            setattr(particles, place, columns[name])
+        particles.diameter = 2.0 * columns["radius"]
+        particles.mass = self._mass
+        made.log["time"] = np.array([frame.time])
+        for name, array in columns.items():
+            if name not in KNOWN and name != "radius":
+                made.log[f"particles/{name}"] = array
+        made.validate()
+        return made
+
+    def _has(self, place: int, made: Any) -> bool:
+        """Whether the file has this frame already, whole."""
+        try:
+            found = self._open[place]
+        except (OSError, RuntimeError, KeyError):
+            return False
+        pairs = [(found.configuration.step, made.configuration.step)]
+        pairs += [(found.log.get(name), array) for name, array in made.log.items()]
+        pairs += [
+            (getattr(found.particles, name), getattr(made.particles, name))
+            for name in ("N", *KNOWN.values())
+        ]
+        return all(np.array_equal(np.asarray(a), np.asarray(b)) for a, b in pairs)
+
+    def _whole_box(self) -> list[float]:
+        """Lengths of the box, and no tilts."""
+        positions = [scene.position for scene in self.sim.scenes]
+        reach = np.abs(np.concatenate([np.zeros((1, 3)), *positions])).max(axis=0)
+        length = self.sim.model.box_length.max(axis=0) if self.sim.model.periodic else np.zeros(3)
+        reached = np.where(reach > 0, 2.0 * reach, 1.0)
+        return [*np.where(length > 0, length, reached).tolist(), 0.0, 0.0, 0.0]
+
+
+def _gsd() -> Any:
+    try:
+        import gsd.hoomd
+    except ImportError:
+        raise ImportError(
+            "GsdRecorder: gsd must be installed, got no such package; "
+            "pip install 'particlesim[gsd]'."
+        ) from None
+    return gsd.hoomd

@@ -1,0 +1,168 @@
+"""Recording a simulation into USD, frame by frame."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from ... import validate
+from .drawing import Drawing
+from .fields import ParticleColors, ParticleFields
+from .writer import UsdWriter
+
+if TYPE_CHECKING:
+    from ...simulation.simulation import Simulation
+
+
+@dataclass(frozen=True, eq=False)
+class FrameData:
+    """All that is written of one frame, on the host (see :meth:`UsdRecorder.capture`).
+
+    ``changing`` are the further arguments of :meth:`particlesim.output.usd.UsdWriter.write`.
+    """
+
+    number: int
+    position: np.ndarray
+    velocity: np.ndarray
+    fields: dict[str, np.ndarray]
+    changing: dict[str, Any] = field(default_factory=dict)
+
+
+class UsdRecorder:
+    """Records the frames of a simulation into a USD file, each safe as soon as it is written.
+
+    Groups are drawn as points; those that were given triangles as meshes with normals. Pairs of
+    constraints and springs are drawn as curves, unless both ends are in one mesh, and until they
+    break. Boundaries are meshes, and have a transform in every frame where they move.
+
+    Args:
+        sim: The simulation.
+        path: The root file, ``.usda``, ``.usd`` or ``.usdc``; frames go to ``<stem>.clips``.
+        frames: How many more frames of the simulation are planned; more or fewer may come.
+        fields: Names of further values to write as primvars: arrays of the state (``"density"``,
+            ``"force"``), attributes of the particles, ``"speed"``; in the simulation's units.
+        fps: Frames a second of playback; None: in real time where that is sensible, else 24.
+        overwrite: Replace an existing recording.
+        worlds: Which worlds to record, by number; None: all.
+        groups: Which groups, by name or themselves; None: all.
+        layout: None leaves the worlds where they are; ``"grid"`` puts them side by side on the
+            ground; (3,) is the way from each to the next [length]. It becomes the transform of
+            ``/World/env_####``: points keep their positions.
+        every: Record every k-th frame of the simulation, those whose number k divides. Time codes
+            still count one by one: code c is the simulation's frame k c, and playback keeps its
+            speed with 1/k of the frames a second.
+        color_by: Colour particles by a value, any name that ``fields`` takes; vectors by their
+            length. None: each group has its own colour, as surfaces of fluids always have.
+        color_map: ``"viridis"``, ``"magma"``, ``"cubehelix"``, ``"coolwarm"``, ``"gray"``, or
+            colours (k, 3), linear.
+        color_range: (lower, upper) numbers with the first and the last colour; None: the least
+            and the greatest in the first frame in which particles differ.
+        instancer: Draw groups as a PointInstancer of spheres. Files are larger, and Blender shows
+            no colours of instances.
+        surface: Draw the fluid of each SPH as one mesh a frame, its surface, and leave its
+            particles out; options of :class:`~particlesim.Surface`, or True for none.
+        resume: Go on after the recorded frame of this number; those after it are replaced.
+
+    Raises:
+        FileExistsError, FileNotFoundError, ValueError: As :class:`~particlesim.output.usd.UsdWriter`, and
+            names of worlds, groups, fields and colour maps that are not there.
+
+    Example:
+        >>> from particlesim import Scene, Simulation
+        >>> scene = Scene()
+        >>> ball = scene.add_particles([(0, 1, 0)], velocity=(1, 0, 0), radius=0.1)
+        >>> sim = Simulation(scene, device="cpu")
+        >>> with UsdRecorder(sim, "ball.usda", frames=1, color_by="speed") as recorder:
+        ...     recorder.write()
+        ...     sim.step()
+        ...     recorder.write()
+    """
+
+    def __init__(
+        self,
+        sim: Simulation,
+        path: str | os.PathLike[str],
+        *,
+        frames: int = 1,
+        fields: Iterable[str] = (),
+        fps: float | None = None,
+        overwrite: bool = False,
+        worlds: Iterable[int] | None = None,
+        groups: Iterable[Any] | None = None,
+        layout: Any = None,
+        every: int = 1,
+        color_by: str | None = None,
+        color_map: Any = "viridis",
+        color_range: tuple[float, float] | None = None,
+        instancer: bool = False,
+        surface: bool | Mapping[str, Any] = False,
+        resume: int | None = None,
+    ):
+        self.sim = sim
+        self.every = validate.whole("UsdRecorder", "every", every, minimum=1)
+        validate.whole("UsdRecorder", "frames", frames)
+        first, last = -(-sim.frame // self.every), (sim.frame + frames) // self.every
+        self.drawing = Drawing(
+            sim, frames=max(1, last - first + 1), frame_time=self.every * sim.settings.dt, fps=fps,
+            worlds=worlds, groups=groups, layout=layout, instancer=instancer,
+            surface=surface,
+        )  # fmt: skip
+        self.fields = ParticleFields(sim, fields)
+        kinds = {name: self.fields.kind(name) for name in self.fields.names}
+        self.colors: ParticleColors | None = None
+        if color_by is not None:
+            rows = self.drawing.rows
+            self.colors = ParticleColors(sim, color_by, color_map, color_range, rows)
+            kinds["displayColor"] = "color"
+        self.writer = UsdWriter(
+            path, self.drawing.info, fields=kinds, overwrite=overwrite, resume=resume
+        )
+        if self.colors is not None:
+            self.colors.restore(self.writer.notes)
+
+    def write(self) -> None:
+        """Write the simulation's present state as its present frame, if that is to be recorded."""
+        self.write_frame(self.capture())
+
+    def capture(self) -> FrameData | None:
+        """Copy to the host all that the present frame needs, and touch no file.
+
+        What it returns shares nothing with the simulation: another thread may write it while the
+        simulation goes on. None: ``every`` leaves this frame out.
+        """
+        sim = self.sim
+        if sim.frame % self.every:
+            return None
+        fields = self.fields.read()
+        drawing = self.drawing
+        changing: dict[str, Any] = {
+            "pairs": drawing.pairs(),
+            "meshes": drawing.meshes(),
+            "poses": drawing.poses(),
+        }
+        if self.colors is not None:
+            fields["displayColor"] = self.colors.read()
+            changing["notes"] = self.colors.notes()
+        number = sim.frame // self.every
+        return FrameData(number, sim.position, sim.velocity, fields, changing)
+
+    def write_frame(self, frame: FrameData | None) -> None:
+        """Write what :meth:`capture` returned; touches no simulation."""
+        if frame is not None:
+            self.writer.write(
+                frame.number, frame.position, frame.velocity, frame.fields, **frame.changing
+            )
+
+    def close(self) -> None:
+        """Give the file the end that was reached."""
+        self.writer.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self.writer.__exit__(*error)

@@ -1,0 +1,1 @@
+"""Pictures and films of recordings and simulations, and the live view."""

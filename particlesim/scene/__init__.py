@@ -1,0 +1,1 @@
+"""Scenes as descriptions, in NumPy on the host: particles, parts, settings, laws, samples."""

@@ -1,0 +1,166 @@
+"""Laws: plain Python functions that become Warp functions in either precision."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import inspect
+import textwrap
+from collections.abc import Callable
+from typing import Any
+
+import warp as wp
+
+from .. import validate
+from ..kernels.precision import Precision, translate
+
+UNROLLED = 16  # rounds up to which Warp writes a loop out
+
+
+class Law:
+    """A law of physics as one function; made by :func:`law`.
+
+    The function stays callable from Python. Its parameters without annotation are floats.
+    """
+
+    def __init__(self, func: Callable[..., Any]):
+        functools.update_wrapper(self, func)
+        self.func = func
+        if func.__name__ == "<lambda>" or not _has_source(func):
+            raise TypeError(
+                f"law: func must be a def in a file or notebook, got {func!r}; Warp reads its "
+                "source."
+            )
+        signature = inspect.signature(func, eval_str=True)
+        self.parameters: dict[str, Any] = {}
+        self.defaults: dict[str, Any] = {}
+        for name, parameter in signature.parameters.items():
+            if parameter.kind not in (parameter.POSITIONAL_OR_KEYWORD, parameter.POSITIONAL_ONLY):
+                raise TypeError(
+                    f"law: parameter {name!r} of {func.__name__} must be positional, got "
+                    f"{parameter.kind.description}; write each parameter by name."
+                )
+            self.parameters[name] = parameter.annotation
+            if parameter.default is not parameter.empty:
+                self.defaults[name] = parameter.default
+        self._functions: dict[str, wp.Function] = {}
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        return self.func(*args, **kwargs)
+
+    @property
+    def name(self) -> str:
+        """Name of the function."""
+        return self.func.__name__
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """The same for laws of the same code and closure, each made anew as they may be."""
+        cells = [cell.cell_contents for cell in self.func.__closure__ or ()]
+        return (
+            self.func.__code__,
+            *(value.key if isinstance(value, Law) else repr(value) for value in cells),
+        )
+
+    def check_derivable(self, owner: str) -> None:
+        """Refuse loops that Warp does not write out: it derives them wrongly, and silently.
+
+        Raises:
+            ValueError: A ``while``, or a ``for`` whose rounds are not known in advance or over 16.
+        """
+        scope = _scope(self.func)
+        for node in ast.walk(ast.parse(textwrap.dedent(inspect.getsource(self.func)))):
+            if isinstance(node, ast.While | ast.For) and not _is_unrolled(node, self.func, scope):
+                raise validate.fail(
+                    owner, f"law {self.name}",
+                    f"loop at most {UNROLLED} rounds known in advance, to be derived",
+                    ast.unparse(node).partition("\n")[0], "unroll it, or give the force itself",
+                )  # fmt: skip
+        for name in {*self.func.__code__.co_names, *self.func.__code__.co_freevars}:
+            helper = _as_law(scope.get(name))
+            if isinstance(helper, Law) and helper.func is not self.func:
+                helper.check_derivable(owner)
+
+    def function(self, precision: Precision) -> wp.Function:
+        """The Warp function in ``precision``, translated on first use."""
+        if precision.name not in self._functions:
+            self._functions[precision.name] = translate(
+                self.func, precision, lambda value: _helper(value, precision)
+            )
+        return self._functions[precision.name]
+
+
+def _helper(value: Any, precision: Precision) -> Any:
+    """What a law that names ``value`` calls in ``precision``."""
+    value = _as_law(value)
+    return value.function(precision) if isinstance(value, Law) else value
+
+
+def _as_law(value: Any) -> Any:
+    """Warp functions written in Python are read as laws."""
+    if isinstance(value, wp.Function) and value.func is not None and value.native_snippet is None:
+        return _law_of(value.func)
+    return value
+
+
+def _scope(func: Callable[..., Any]) -> dict[str, Any]:
+    """What the names of a function mean that are not its own."""
+    cells = zip(func.__code__.co_freevars, func.__closure__ or (), strict=True)
+    return {**func.__globals__, **{name: cell.cell_contents for name, cell in cells}}
+
+
+def _is_unrolled(node: ast.While | ast.For, func: Callable[..., Any], scope: dict) -> bool:
+    """Whether Warp writes this loop out: a range of known bounds, few rounds and no break."""
+    if isinstance(node, ast.While) or not isinstance(node.iter, ast.Call):
+        return False
+    bounds = []
+    for bound in node.iter.args:
+        value = bound.value if isinstance(bound, ast.Constant) else None
+        if isinstance(bound, ast.Name) and bound.id not in func.__code__.co_varnames:
+            value = scope.get(bound.id)
+        if not isinstance(value, int):
+            return False
+        bounds.append(value)
+    breaks = any(isinstance(inner, ast.Break) for inner in ast.walk(node))
+    return not breaks and len(range(*bounds)) <= UNROLLED
+
+
+def _has_source(func: Callable[..., Any]) -> bool:
+    try:
+        return bool(inspect.getsource(func))
+    except (OSError, TypeError):
+        return False
+
+
+@functools.cache
+def _law_of(func: Callable[..., Any]) -> Law:
+    """One law for one function, so that a kernel does not get it twice."""
+    return Law(func)
+
+
+def law(func: Callable[..., Any]) -> Law:
+    """Declare a law: a function of floats and vectors, written once for both precisions.
+
+    The body is Warp's subset of Python (``wp.sqrt``, ``wp.length``, branches, loops). Float
+    literals, ``float`` and ``wp.vec3`` take the precision of the simulation, and so do the numbers
+    and vectors that it names outside itself; a number that meets them is written ``2.0``, not
+    ``2``. ``int`` parameters stay whole. A law may call other laws and Warp functions. A law of
+    pairs that chooses by ``wp.where``, ``wp.max``, ``wp.min`` or ``wp.clamp`` rather than by ``if``
+    runs on the CPU's vector units, its derivative too. What the first parameters mean is up to who
+    uses the law (see ``PairForce``, ``ParticleForce``, ``Constraint``); the others are given by
+    keyword there.
+
+    Example:
+        >>> @law
+        ... def spring(r: float, stiffness: float, length: float):
+        ...     return 0.5 * stiffness * (r - length) ** 2.0
+        >>> list(spring.parameters)
+        ['r', 'stiffness', 'length']
+    """
+    if isinstance(func, Law):
+        return func
+    if isinstance(func, wp.Function) and func.func is not None:
+        func = func.func
+    if not inspect.isfunction(func):
+        raise TypeError(f"law: func must be a function, got {func!r}; decorate a def.")
+    return Law(func)

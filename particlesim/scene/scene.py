@@ -1,0 +1,304 @@
+"""Scene and Group: what there is, in NumPy on the host, without device work."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import validate
+from .bounds import corners
+
+if TYPE_CHECKING:
+    from ..constraints.base import ConstraintBase
+    from ..interactions.base import Interaction
+
+# Names of the engine's own per-particle arrays, which attributes of a scene cannot take.
+RESERVED = frozenset(
+    "position velocity mass inverse_mass radius force world density pressure correction image "
+    "previous_position position_error velocity_error time dt x".split()
+)
+Color = tuple[float, float, float]
+PALETTE: tuple[Color, ...] = (
+    (0.26, 0.52, 0.86), (0.90, 0.45, 0.20), (0.35, 0.70, 0.40), (0.80, 0.30, 0.45),
+    (0.60, 0.45, 0.80), (0.85, 0.70, 0.25), (0.40, 0.70, 0.75), (0.60, 0.55, 0.50),
+)  # fmt: skip
+
+
+class Group:
+    """A run of particles of a scene, made by one ``add_particles``.
+
+    ``group[k]`` is the index in the scene of the group's k-th particle; slices and arrays give
+    arrays of indices, ready for pairs and constraints. ``triangles`` (t, 3) int, counted within the
+    group, is the surface that it is drawn as; None: it is drawn as points.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        name: str,
+        start: int,
+        stop: int,
+        color: Color,
+        triangles: np.ndarray | None = None,
+    ):
+        self.scene, self.name, self.start, self.stop = scene, name, start, stop
+        self.color, self.triangles = color, triangles
+
+    def __len__(self) -> int:
+        return self.stop - self.start
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(range(self.start, self.stop))
+
+    def __getitem__(self, key: Any) -> Any:
+        picked = self.indices[key]
+        return int(picked) if np.isscalar(picked) or picked.ndim == 0 else picked
+
+    def __repr__(self) -> str:
+        return f"Group({self.name!r}, {len(self)} particles)"
+
+    @property
+    def indices(self) -> np.ndarray:
+        """Indices of the group's particles in the scene, (n,) int."""
+        return np.arange(self.start, self.stop)
+
+    @property
+    def slice(self) -> slice:
+        """The group's rows in the scene's arrays."""
+        return slice(self.start, self.stop)
+
+
+class Scene:
+    """Particles, interactions and constraints, as a description.
+
+    Args:
+        up_axis: ``"x"``, ``"y"`` or ``"z"``; used by scenes' gravity and by exports.
+        meters_per_unit: Length of one unit [m], for exports.
+        periodic: ``(lower, upper)`` corners of a periodic box; None on an axis leaves it open:
+            ``((0, None, 0), (1, None, 1))``. None: open everywhere.
+        bounds: ``(lower, upper)`` corners of what no particle may leave, each side open where it is
+            None; the watchdog reports who does (see Settings). They hold nothing: boundaries do.
+
+    Example:
+        >>> scene = Scene()
+        >>> ball = scene.add_particles([(0, 1, 0)], mass=2.0, radius=0.1, group="ball")
+        >>> len(ball), scene.particle_count
+        (1, 1)
+    """
+
+    def __init__(
+        self,
+        up_axis: str = "y",
+        meters_per_unit: float = 1.0,
+        periodic: tuple[Sequence[float | None], Sequence[float | None]] | None = None,
+        bounds: tuple[Sequence[float | None], Sequence[float | None]] | None = None,
+    ):
+        self.up_axis = validate.choice("Scene", "up_axis", up_axis, ("x", "y", "z"))
+        self.meters_per_unit = validate.number(
+            "Scene", "meters_per_unit", meters_per_unit, above=0.0, unit="m"
+        )
+        self.periodic = _box(periodic)
+        self.bounds = corners(bounds)
+        self.groups: list[Group] = []
+        self.interactions: list[Interaction] = []
+        self.constraints: list[ConstraintBase] = []
+        self._columns: dict[str, list[np.ndarray]] = {}
+        self._widths: dict[str, int | None] = {}
+        self.particle_count = 0
+
+    def add_particles(
+        self,
+        position: Any,
+        *,
+        velocity: Any = 0.0,
+        mass: Any = 1.0,
+        radius: Any = 0.0,
+        group: str | None = None,
+        pinned: Any = False,
+        color: Sequence[float] | None = None,
+        triangles: Any = None,
+        **attributes: Any,
+    ) -> Group:
+        """Add particles and return them as a :class:`Group`.
+
+        Args:
+            position: (n, 3) [length].
+            velocity: (3,) for all, or (n, 3) [length/time].
+            mass: One for all, or (n,); above zero [mass].
+            radius: One for all, or (n,); used by contacts, boundaries and pictures [length].
+            group: Name, unique in the scene; None: ``group_<k>``.
+            pinned: One for all, or (n,) bool; a pinned particle has infinite mass for forces
+                and constraints and keeps its velocity.
+            color: (r, g, b) in 0..1, for exports.
+            triangles: (t, 3) int into these particles, counterclockwise from outside: exports draw
+                the group as this surface.
+            **attributes: Further per-particle values, (n,) or (n, 3), that laws may name
+                (``charge=...``). Groups added without one have zeros.
+
+        Raises:
+            ValueError: Wrong shapes, values that are not finite, masses or radii out of range,
+                a name used twice, triangles of other particles.
+        """
+        owner = "Scene.add_particles"
+        x = validate.rows(owner, "position", position, None, 3)
+        count = len(x)
+        name = f"group_{len(self.groups)}" if group is None else str(group)
+        if any(name == other.name for other in self.groups):
+            raise validate.fail(owner, "group", "be a new name", name, "choose another")
+        surface = None if triangles is None else validate.triangles(owner, triangles, count)
+        columns: dict[str, np.ndarray] = {
+            "position": x,
+            "velocity": validate.rows(owner, "velocity", velocity, count, 3),
+            "mass": validate.rows(owner, "mass", mass, count, None),
+            "radius": validate.rows(owner, "radius", radius, count, None),
+            "pinned": validate.rows(owner, "pinned", pinned, count, None),
+        }
+        m, r, held = columns["mass"], columns["radius"], columns["pinned"]
+        _bounded(owner, "mass", m, m > 0, "above 0", "use pinned=True to hold")
+        _bounded(owner, "radius", r, r >= 0, "at least 0", "give a size")
+        _bounded(owner, "pinned", held, (held == 0) | (held == 1), "True or False", "choose one")
+        for key, value in attributes.items():
+            columns[key] = self._attribute(owner, key, value, count)
+        for key, column in columns.items():
+            if key not in self._columns:
+                width = column.shape[1] if column.ndim == 2 else None
+                self._widths[key] = width
+                shape = (self.particle_count,) if width is None else (self.particle_count, width)
+                self._columns[key] = [np.zeros(shape)]
+        for key, parts in self._columns.items():
+            width = self._widths[key]
+            shape = (count,) if width is None else (count, width)
+            parts.append(columns.get(key, np.zeros(shape)))
+        chosen = PALETTE[len(self.groups) % len(PALETTE)]
+        if color is not None:
+            rgb = validate.vector(owner, "color", color)
+            _bounded(owner, "color", rgb, (rgb >= 0) & (rgb <= 1), "from 0 to 1", "scale it")
+            red, green, blue = rgb
+            chosen = (float(red), float(green), float(blue))
+        start = self.particle_count
+        result = Group(self, name, start, start + count, chosen, surface)
+        self.groups.append(result)
+        self.particle_count += count
+        return result
+
+    def _attribute(self, owner: str, key: str, value: Any, count: int) -> np.ndarray:
+        if key in RESERVED:
+            raise validate.fail(owner, "attribute", "have a name of its own", key, "rename it")
+        vector = np.ndim(value) == 2 or (np.shape(value) == (3,) and count != 3)
+        column = validate.rows(owner, key, value, count, 3 if vector else None)
+        width = self._widths.get(key, 3 if vector else None)
+        if width != (3 if vector else None):
+            kind = "numbers" if width is None else "vectors"
+            raise validate.fail(owner, key, f"be {kind} as before", np.shape(value), "use one kind")
+        return column
+
+    def add_interaction(self, interaction: Interaction) -> Interaction:
+        """Add a force; it acts at the start of every substep, in the order of adding."""
+        from ..interactions.base import Interaction
+
+        if not isinstance(interaction, Interaction):
+            raise TypeError(
+                f"Scene.add_interaction: interaction must be an Interaction, got {interaction!r}; "
+                "wrap a law in PairForce, PairPotential or ParticleForce."
+            )
+        self.interactions.append(interaction)
+        return interaction
+
+    def add_constraint(self, constraint: ConstraintBase) -> ConstraintBase:
+        """Add a constraint; it projects positions after integration, in the order of adding."""
+        from ..constraints.base import ConstraintBase
+
+        if not isinstance(constraint, ConstraintBase):
+            raise TypeError(
+                f"Scene.add_constraint: constraint must be a constraint, got {constraint!r}; "
+                "wrap a law in Constraint."
+            )
+        self.constraints.append(constraint)
+        return constraint
+
+    def column(self, name: str) -> np.ndarray:
+        """A per-particle array of the description, (n,) or (n, 3) float64."""
+        if name not in self._columns:
+            width = 3 if name in ("position", "velocity") else None
+            return np.zeros((self.particle_count,) if width is None else (0, 3))
+        parts = self._columns[name]
+        if len(parts) > 1:
+            parts[:] = [np.concatenate(parts)]
+        return parts[0]
+
+    @property
+    def attributes(self) -> dict[str, int | None]:
+        """Names of the per-particle values, with None for numbers and 3 for vectors."""
+        return dict(self._widths)
+
+    @property
+    def position(self) -> np.ndarray:
+        """Start positions, (n, 3)."""
+        return self.column("position")
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Start velocities, (n, 3)."""
+        return self.column("velocity")
+
+    @property
+    def mass(self) -> np.ndarray:
+        """Masses, (n,)."""
+        return self.column("mass")
+
+    @property
+    def radius(self) -> np.ndarray:
+        """Radii, (n,)."""
+        return self.column("radius")
+
+    @property
+    def pinned(self) -> np.ndarray:
+        """Which particles are pinned, (n,) bool."""
+        return self.column("pinned") > 0
+
+    def __getitem__(self, name: str) -> Group:
+        """The group of that name."""
+        for group in self.groups:
+            if group.name == name:
+                return group
+        names = [group.name for group in self.groups]
+        raise KeyError(f"Scene: group must be one of {names}, got {name!r}; choose one of these.")
+
+
+def _box(periodic: Any) -> tuple[np.ndarray, np.ndarray, tuple[bool, bool, bool]] | None:
+    """Lower corner, upper corner and which axes are periodic; zeros on open axes."""
+    if periodic is None:
+        return None
+    owner = "Scene"
+    try:
+        lengths = [len(corner) for corner in periodic]
+    except TypeError:
+        lengths = []
+    if lengths != [3, 3]:
+        raise validate.fail(
+            owner, "periodic", "be (lower, upper), three each", periodic, "give both corners"
+        )
+    on = [lo is not None and hi is not None for lo, hi in zip(*periodic, strict=True)]
+    lower = validate.vector(
+        owner, "periodic lower", [a if k else 0 for a, k in zip(periodic[0], on, strict=True)]
+    )
+    upper = validate.vector(
+        owner, "periodic upper", [a if k else 0 for a, k in zip(periodic[1], on, strict=True)]
+    )
+    if not any(on):
+        return None
+    if (upper - lower)[on].min() <= 0:
+        raise validate.fail(
+            owner, "periodic", "have its upper corner above the lower", periodic, "swap them"
+        )
+    return lower, upper, (on[0], on[1], on[2])
+
+
+def _bounded(
+    owner: str, name: str, values: np.ndarray, good: np.ndarray, condition: str, remedy: str
+) -> None:
+    if not good.all():
+        at = int(np.argmin(good))
+        raise validate.fail(owner, f"{name}[{at}]", f"be {condition}", float(values[at]), remedy)

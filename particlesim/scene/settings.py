@@ -1,0 +1,147 @@
+"""Settings: every knob that trades speed for accuracy, and nothing about the scene itself."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+from .. import validate
+
+INTEGRATORS = ("symplectic_euler", "velocity_verlet")
+PRECISIONS = ("float32", "float64")
+EXECUTIONS = ("auto", "graph", "threads")
+ON_FAILURE = ("stop", "retry", "freeze")
+AUTO = "auto"  # a dt or substeps that a simulation chooses when it is made
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How a scene is simulated. Frozen; :meth:`replace` makes a changed copy.
+
+    Args:
+        dt: Time of one frame, that is of one ``sim.step()`` [s]. ``"auto"``: the simulation takes
+            ``substeps * safety * stability().dt`` of its start, and has that number in its own
+            ``settings``.
+        safety: Part of the largest safe substep that ``"auto"`` takes, above 0, at most 1. The
+            limit is that of the start, and what starts at rest may become stiffer.
+        substeps: Substeps a frame; each advances by ``dt / substeps``. ``"auto"``: as many as make
+            a substep at most ``safety * stability().dt``, likewise.
+        iterations: Sweeps over the constraints a substep (XPBD). Compliant constraints do not
+            depend on it; stiff ones come closer to C = 0.
+        integrator: ``"symplectic_euler"`` (first order, any scene) or ``"velocity_verlet"``
+            (second order, scenes without constraints).
+        precision: ``"float32"`` or ``"float64"``, in every kernel.
+        skin: Added to the cutoff of neighbour lists [length]; they are rebuilt when a particle has
+            moved half of it. Changes the cost, not the forces. None: 0.12 of the cutoff, 0.2 of
+            that of contacts.
+        compensated: Carry the rounding error of positions and velocities along (Kahan 1965), so
+            that neither freezes where an increment is below the last bit.
+        relaxation: Factor on averaged (Jacobi) contact corrections, above 0, at most 1: more would
+            feed energy into stacks.
+        depenetration_speed: Largest speed at which contacts push overlapping particles apart
+            [length/s]. None: one radius a frame.
+        execution: ``"graph"``, ``"threads"`` (CPU) or ``"auto"``, the faster as measured. Changes
+            the cost, not one bit of the result.
+        threads: CPU threads. None: as many as the process may use.
+        watchdog: Look at every particle once a frame: that it is finite, where it may be, and
+            without a runaway energy. False: what goes wrong stays unseen.
+        on_failure: What happens to a world that the watchdog finds wrong. ``"stop"``: a
+            ``SimulationError``, from the last good frame. ``"retry"``: the frame is done again from
+            there with twice the substeps, and twice of those. ``"freeze"``: it stays at its last
+            good frame until it is reset. The other worlds never notice.
+        retries: How often ``"retry"`` doubles the substeps of a frame before it stops.
+        energy_growth: Factor, above 1, by which the kinetic energy of a particle may exceed the
+            largest so far (at least that of crossing the scene in a frame) unasked. Beyond it the
+            frame is done again with two and four times the substeps: an energy that these agree on
+            within a factor of two has a cause and is accepted; another is a runaway.
+        ledger: Keep account of the work and impulse of every interaction and constraint (see
+            ``Simulation.ledger``).
+
+    Raises:
+        ValueError: A value out of range. TypeError: An unknown knob; the message lists all.
+
+    Example:
+        >>> Settings(dt=1 / 60, substeps=20).replace(precision="float64").substeps
+        20
+    """
+
+    dt: float | Any = 1.0 / 60.0  # or AUTO
+    substeps: int | Any = 10  # or AUTO
+    iterations: int = 1
+    integrator: str = "symplectic_euler"
+    precision: str = "float32"
+    skin: float | None = None
+    compensated: bool = True
+    relaxation: float = 1.0
+    depenetration_speed: float | None = None
+    execution: str = "auto"
+    threads: int | None = None
+    watchdog: bool = True
+    on_failure: str = "stop"
+    retries: int = 4
+    energy_growth: float = 100.0
+    ledger: bool = False
+    safety: float = 0.5
+
+    def __new__(cls, *args: Any, **knobs: Any) -> Settings:
+        validate.known("Settings", knobs, [f.name for f in dataclasses.fields(cls)], "knob")
+        return super().__new__(cls)
+
+    def __post_init__(self) -> None:
+        owner = "Settings"
+        checked: dict[str, Any] = {
+            "safety": validate.number(owner, "safety", self.safety, above=0.0, maximum=1.0),
+            "iterations": validate.whole(owner, "iterations", self.iterations, minimum=1),
+            "retries": validate.whole(owner, "retries", self.retries, minimum=1),
+            "energy_growth": validate.number(owner, "energy_growth", self.energy_growth, above=1.0),
+            "relaxation": validate.number(
+                owner, "relaxation", self.relaxation, above=0.0, maximum=1.0
+            ),
+        }
+        chosen = [name for name in ("dt", "substeps") if _is_auto(getattr(self, name))]
+        if len(chosen) == 2:
+            raise validate.fail(
+                owner, "substeps", 'be a number with dt="auto"', AUTO, "choose one of them"
+            )
+        if "dt" not in chosen:
+            checked["dt"] = validate.number(owner, "dt", self.dt, minimum=0.0, unit="s")
+        if "substeps" not in chosen:
+            checked["substeps"] = validate.whole(owner, "substeps", self.substeps, minimum=1)
+        validate.choice(owner, "integrator", self.integrator, INTEGRATORS)
+        validate.choice(owner, "precision", self.precision, PRECISIONS)
+        validate.choice(owner, "execution", self.execution, EXECUTIONS)
+        validate.choice(owner, "on_failure", self.on_failure, ON_FAILURE)
+        if self.skin is not None:
+            checked["skin"] = validate.number(owner, "skin", self.skin, minimum=0.0, unit="length")
+        if self.depenetration_speed is not None:
+            checked["depenetration_speed"] = validate.number(
+                owner, "depenetration_speed", self.depenetration_speed, above=0.0, unit="length/s"
+            )
+        if self.threads is not None:
+            checked["threads"] = validate.whole(owner, "threads", self.threads, minimum=1)
+        for name in ("compensated", "watchdog", "ledger"):
+            value = getattr(self, name)
+            if not isinstance(value, bool):
+                raise validate.fail(owner, name, "be True or False", value, "choose one")
+        for name, value in checked.items():  # plain numbers, whatever kind was given
+            object.__setattr__(self, name, value)
+
+    @property
+    def automatic(self) -> bool:
+        """Whether dt or substeps are yet to be chosen, by the simulation."""
+        return _is_auto(self.dt) or _is_auto(self.substeps)
+
+    @property
+    def substep(self) -> float:
+        """Time of one substep [s]."""
+        return self.dt / self.substeps
+
+    def replace(self, **knobs: Any) -> Settings:
+        """A copy with some knobs changed."""
+        validate.known("Settings", knobs, [f.name for f in dataclasses.fields(self)], "knob")
+        return dataclasses.replace(self, **knobs)
+
+
+def _is_auto(value: Any) -> bool:
+    return isinstance(value, str) and value == AUTO

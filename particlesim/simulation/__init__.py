@@ -1,0 +1,1 @@
+"""The simulation: a face over the rooms below, none of which knows it."""

@@ -1,0 +1,166 @@
+"""Running many frames: recording and progress around ``Simulation.step``."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from .. import validate
+from ..instruments.errors import SimulationError
+from ..output.history.writer import History, check_output
+from ..output.progress import Meter
+from ..output.recorders import open_recorder
+from ..output.recorders.background import BackgroundWriter
+from ..output.recorders.base import Recorder
+from .resume import OWNER, Checkpoints
+
+if TYPE_CHECKING:
+    from .simulation import Simulation
+
+
+def run(
+    sim: Simulation,
+    frames: int,
+    *,
+    record: Any,
+    progress: bool | Callable[[int, int], None],
+    history: Any,
+    overwrite: bool,
+    resume: bool,
+    **options: Any,
+) -> None:
+    """Advance ``sim`` by ``frames`` frames (see :meth:`Simulation.run`)."""
+    first = sim.frame
+    if history is not None:
+        check_output("History", Path(history), overwrite or resume)
+    with contextlib.ExitStack() as stack:
+        recording = measured = None
+        if record is not None:
+            # First of all: a run that is resumed moves on to its checkpoint.
+            recording = stack.enter_context(
+                Recording(sim, frames, record, overwrite=overwrite, resume=resume, **options)
+            )
+        else:
+            _refuse_without_record({"resume": resume, **options})
+        if history is not None:
+            measured = stack.enter_context(
+                History(sim, history, overwrite=overwrite, resume=resume)
+            )
+            measured.write()
+        if progress is True:
+            progress = stack.enter_context(Meter().measure("run", sim, frames))
+        while sim.frame < first + frames:
+            sim.step()
+            if recording is not None:
+                recording.frame()
+            if measured is not None:
+                measured.write()
+            if callable(progress):
+                progress(sim.frame - first, frames)
+
+
+class Recording:
+    """A run's output and checkpoints, written beside the simulation.
+
+    Making one records the present frame; or, where there is something to resume, moves the
+    simulation on to where that ends.
+
+    Args:
+        sim: The simulation, at the start of the run.
+        frames: Of the whole run.
+        record: Path of the output.
+        overwrite: Replace an existing output.
+        checkpoint: Frames from one checkpoint to the next, 0 for none; None: by the clock.
+        resume: Go on with what is there.
+        **options: Of the recorder.
+    """
+
+    def __init__(
+        self,
+        sim: Simulation,
+        frames: int,
+        record: Any,
+        *,
+        overwrite: bool = False,
+        checkpoint: int | None = None,
+        resume: bool = False,
+        **options: Any,
+    ):
+        self.sim, path = sim, Path(record)
+        _check(overwrite, checkpoint, resume)
+        first, end = sim.frame, sim.frame + frames
+        self.checkpoints = None
+        self.recorded: int | None = None
+        if checkpoint != 0:
+            self.checkpoints = Checkpoints(sim, path, checkpoint, options)
+            if resume:
+                # With nothing recorded for certain, what is there is a start to be made again.
+                self.recorded = self.checkpoints.resume()
+                overwrite = self.checkpoints.path.exists()
+        self.recorder: Recorder = open_recorder(
+            sim, path, frames=max(0, end - sim.frame), overwrite=overwrite,
+            resume=self.recorded, **options,
+        )  # fmt: skip
+        self.background = BackgroundWriter()
+        if self.checkpoints is not None and self.recorded is None and sim.frame == first:
+            self.checkpoints.start(overwrite)
+        if self.recorded is None:
+            self.frame()
+
+    def frame(self) -> None:
+        """Record the present frame, if that is to be, and make a checkpoint when one is due.
+
+        Raises:
+            Exception: What the writing of an earlier frame raised.
+        """
+        self.background.make_room()
+        captured = self.recorder.capture()
+        if captured is not None:
+            self.recorded = captured.number
+            self.background.put(lambda: self.recorder.write_frame(captured))
+        if self.checkpoints is not None and self.checkpoints.due():
+            self.background.put(self.checkpoints.capture(self.recorded))
+
+    def close(self) -> None:
+        """Write what has been captured, the end of the output, and the state to go on from."""
+        self.background.close()
+        self.recorder.close()
+        if self.checkpoints is not None and not self.checkpoints.complete:
+            self.checkpoints.capture(self.recorded)()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        if error is None:
+            self.close()
+            return
+        # Finished frames are kept; the first error is the one to see.
+        with contextlib.suppress(Exception):
+            self.background.close()
+            if isinstance(error, SimulationError) and self.checkpoints is not None:
+                self.checkpoints.capture(self.recorded)()  # of the last good frame
+        with contextlib.suppress(Exception):
+            self.recorder.close()
+
+
+def _check(overwrite: bool, checkpoint: int | None, resume: bool) -> None:
+    if checkpoint is not None:
+        validate.whole(OWNER, "checkpoint", checkpoint)
+    if resume and overwrite:
+        raise validate.fail(
+            OWNER, "resume", "come without overwrite", resume, "go on, or start anew"
+        )
+    if resume and checkpoint == 0:
+        raise validate.fail(
+            OWNER, "checkpoint", "be above 0 where a run is resumed", checkpoint, "leave it out"
+        )
+
+
+def _refuse_without_record(options: dict[str, Any]) -> None:
+    """Without an output there is nothing that these could be about."""
+    for name, value in options.items():
+        if name != "fields" and value not in (None, False):
+            raise validate.fail(OWNER, "record", f"be given where {name} is", None, "name a file")
