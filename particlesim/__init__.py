@@ -33,12 +33,10 @@ from .constraints.constraint import Constraint
 from .constraints.contact import Contact
 from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
-from .instruments.errors import SimulationError, SimulationWarning
 from .instruments.ledger.ledger import Ledger
 from .instruments.stability.check import StabilityWarning
 from .instruments.stability.report import Stability
-from .instruments.watchdog.incident import Incident
-from .interactions.base import Interaction
+from .instruments.watchdog.incident import Incident, SimulationError, SimulationWarning
 from .interactions.fluid.equations_of_state import Polytrope, Tait
 from .interactions.fluid.sph import SPH
 from .interactions.fluid.viscosities import ArtificialViscosity
@@ -52,12 +50,12 @@ from .output.surface.surface import Surface
 from .output.usd.recorder import UsdRecorder
 from .pictures.render.camera import Camera
 from .scene import sample
+from .scene.group import Group
 from .scene.law import Law, law
-from .scene.scene import Group, Scene
+from .scene.part import Interaction
+from .scene.scene import Scene
 from .scene.settings import Settings
 from .simulation.simulation import Simulation
-
-__version__ = "0.1.0"
 
 __all__ = [
     "SPH",

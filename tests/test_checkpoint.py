@@ -121,7 +121,7 @@ def test_worlds(integrator, precision, device, tmp_path, liquid):
     sim.run(2)
     sim.reset([1])  # its forces are not known
     sim.world(2).velocity = 0.1
-    assert sim._unknown_forces >= {1, 2}
+    assert sim.loop.unknown_forces >= {1, 2}
     restart(sim, tmp_path / "run.npz", scenes())
 
 

@@ -51,7 +51,7 @@ def test_one_pass_gives_the_sum_of_the_forces(precision, device):
     parts = [forces(liquid(make), precision, device)[0] for make in
              (lennard_jones, screened, pushing)]  # fmt: skip
     together, sim = forces(liquid(lennard_jones, screened, pushing), precision, device)
-    assert [each.name for each in sim.passes] == ["LennardJones + PairPotential + PairForce"]
+    assert [each.name for each in sim.loop.passes] == ["LennardJones + PairPotential + PairForce"]
     # About 80 neighbours with forces up to 1e2 each: their sum in another order.
     tolerance = 80 * 1e2 * np.finfo(together.dtype).eps
     np.testing.assert_allclose(together, sum(parts), rtol=0, atol=tolerance)
@@ -73,7 +73,7 @@ def test_other_groups_and_other_cutoffs_are_passes_of_their_own():
     scene.add_interaction(ps.LennardJones(cutoff=5.0))
     scene.add_interaction(ps.UniformGravity())
     sim = ps.Simulation(scene, device="cpu")
-    assert len(sim.passes) == 4
+    assert len(sim.loop.passes) == 4
 
 
 def test_parameters_are_per_world(device):
@@ -106,6 +106,6 @@ def test_one_law_twice(precision, device):
     makes = (lennard_jones, weak, repelling, repelling)
     parts = [forces(liquid(make), precision, device)[0] for make in makes]
     together, sim = forces(liquid(*makes), precision, device)
-    assert len(sim.passes) == 1
+    assert len(sim.loop.passes) == 1
     tolerance = 80 * 1e2 * np.finfo(together.dtype).eps  # as above
     np.testing.assert_allclose(together, sum(parts), rtol=0, atol=tolerance)

@@ -16,7 +16,6 @@ import particlesim as ps
 from particlesim import kernels
 from particlesim.commands.scene_files import load_scene, ready_scenes
 from particlesim.engine.execution import launch
-from particlesim.engine.execution.frames import record_frame
 from particlesim.engine.execution.launch import Launch, Program
 from particlesim.engine.model import Model
 from particlesim.kernels.precision import KERNELS
@@ -148,15 +147,15 @@ def launched(monkeypatch):
 def simulate(name, precision):
     build, knobs = SCENES[name]
     sim = ps.Simulation(build(), ps.Settings(precision=precision, **knobs), device="cpu")
-    sim.watchdog.resume(sim, [0])  # as if its only world were frozen
+    sim.watchdog.resume(sim.frames, [0])  # as if its only world were frozen
     peak = sim.model.array(np.zeros(sim.particle_count), sim.model.precision.scalar)
-    record_frame(sim, sim.settings.substeps, peak)
+    sim.frames._record(sim.settings.substeps, peak)
     sample(sim)
     sim.project(1)
     for interaction in sim.interactions:
         if isinstance(interaction, ps.SPH):
             with np.errstate(invalid="ignore"):  # densities were not computed
-                interaction.interpolate([(0, 0, 0)], "density")
+                sim.interpolate(interaction, [(0, 0, 0)], "density")
     for constraint in sim.constraints:
         with launch.record(Program()):
             constraint.reset([0])

@@ -10,7 +10,6 @@ import warp as wp
 import particlesim as ps
 from particlesim.engine.execution import launch
 from particlesim.engine.execution.executors import EagerExecutor, GraphExecutor, ThreadExecutor
-from particlesim.engine.execution.frames import evaluate_forces
 from particlesim.engine.execution.launch import CHUNK, Frame, Launch, Program, When
 from particlesim.engine.execution.threads import Chain, Team
 
@@ -48,8 +47,7 @@ def test_the_same_bits_whichever_way(melt, method):
         results[execution, threads] = sim.position, sim.velocity, sim.diagnostics().potential
     eager = melt("graph", None, integrator=method)
     eager.executor.chosen = EagerExecutor(eager.executor.frame)
-    if method == "velocity_verlet":
-        evaluate_forces(eager)
+    eager.loop.know_forces()
     for _ in range(6):
         eager.executor.run()
     reference = eager.position, eager.velocity, eager.diagnostics().potential

@@ -7,9 +7,9 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from particlesim.constraints.base import ConstraintBase
 from particlesim.engine.execution import launch
 from particlesim.engine.execution.launch import Program
+from particlesim.scene.part import ConstraintBase
 
 
 def drifting(count=3, **options):

@@ -10,10 +10,10 @@ import warp as wp
 
 import particlesim as ps
 from particlesim.commands.scene_files import ready_scenes
+from particlesim.engine.probing.limit import Limit, explicit_step
 from particlesim.engine.probing.probe import Probe
 from particlesim.engine.probing.spectrum import largest
 from particlesim.instruments.stability.check import StabilityWarning
-from particlesim.instruments.stability.report import Limit, explicit_step
 from particlesim.interactions.fluid.limits import steepest
 from particlesim.interactions.fluid.smoothing import SMOOTHING
 from particlesim.interactions.spring_limits import spring_bound
@@ -356,7 +356,7 @@ def test_sound_limit_is_that_of_the_fluid_itself(smoothing):
     sph = sim.interactions[0]
     sound = sim.stability().binding
     assert sound.kind == "sound"
-    with Probe(sim) as probe:
+    with Probe(sim.loop) as probe:
         (true,) = probe.response(sph)
         c = sph.sound_speeds(probe)
     # The continuum's wave of largest omega against the lattice's: 74 neighbours, within 5 %.
@@ -368,7 +368,7 @@ def test_sound_limit_is_that_of_the_fluid_itself(smoothing):
 
 def test_sound_speed_follows_the_density():
     sim = simulation(fluid(), precision="float64")
-    with Probe(sim) as probe:
+    with Probe(sim.loop) as probe:
         c = sim.interactions[0].sound_speeds(probe)
         rho = probe.state.density.numpy().copy()  # that of before comes back
     # Tait with gamma = 7: c = c0 s^3.

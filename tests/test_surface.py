@@ -186,7 +186,7 @@ def test_isotropic_surface_is_the_level_of_the_colour_field(precision):
     assert_closed(triangles)
 
     def color(where):
-        return sph.interpolate(where, np.ones(len(x)))
+        return sim.interpolate(sph, where, np.ones(len(x)))
 
     # Four steps of Newton's or halving leave at most 1/16 of a spacing of 0.5, mostly far less;
     # the field's slope is below one.
@@ -244,7 +244,7 @@ def test_marching_equals_warps_dense_marching_cubes():
     points, triangles, _ = ps.Surface(sim, anisotropic=False, spacing=spacing).mesh()
     low, shape = -8, (48, 36, 32)
     nodes = (np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1) + low) * spacing
-    field = sph.interpolate(nodes.reshape(-1, 3), np.ones(len(x))).reshape(shape)
+    field = sim.interpolate(sph, nodes.reshape(-1, 3), np.ones(len(x))).reshape(shape)
     found, corners = IsoSurfaceMarchingCubes.extract(
         wp.array(field.astype(np.float32), dtype=float, device="cpu"), LEVEL_ISOTROPIC
     )

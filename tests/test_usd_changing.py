@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
-from particlesim.output.usd.geometry import vertex_normals
+from particlesim.output.usd.frame import vertex_normals
 from particlesim.output.usd.info import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
 from particlesim.output.usd.shapes import Shape as SameShape
 from particlesim.output.usd.writer import UsdWriter

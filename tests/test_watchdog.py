@@ -125,7 +125,7 @@ def test_of_fused_forces_the_one_is_named(device):
             type(name, (ps.PairForce,), {})(anchor, cutoff=1.5, stiffness=strength)
         )
     sim = ps.Simulation(scene, ps.Settings(dt=10.0, substeps=1), device=device)
-    assert len(sim.passes) == 1
+    assert len(sim.loop.passes) == 1
     with pytest.raises(ps.SimulationError, match="look at broken, which did it"):
         sim.step()
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,7 @@ from .. import validate
 from ..output.progress import Meter, bar
 from ..pictures.render import film, image
 from ..pictures.render.camera import FIELD_OF_VIEW, Camera
-
-if TYPE_CHECKING:
-    from ..pictures.render.stage import View
+from ..pictures.render.stage import View
 
 OWNER = "render"
 ENGINES = ("warp", "cycles")

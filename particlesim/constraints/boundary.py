@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .. import validate
+from ..engine.model import Model
+from ..engine.probing.limit import Limit
+from ..engine.probing.probe import Probe
 from ..kernels.constraints import boundary_shapes
 from .boundary_base import STILL, Boundary
-
-if TYPE_CHECKING:
-    from ..engine.model import Model
-    from ..engine.probing.probe import Probe
-    from ..instruments.stability.report import Limit
+from .limits import box_limits, sphere_limits
 
 
 class PlaneBoundary(Boundary):
@@ -156,8 +155,6 @@ class BoxBoundary(Boundary):
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the speed of the particles against the width; half spaces are never passed through."""
-        from .limits import box_limits
-
         return box_limits(self, probe)
 
     def _pivot(self) -> np.ndarray:
@@ -229,8 +226,6 @@ class SphereBoundary(Boundary):
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the speed of the particles against the radius."""
-        from .limits import sphere_limits
-
         return sphere_limits(self, probe)
 
     def _pivot(self) -> np.ndarray:

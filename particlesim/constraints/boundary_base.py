@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from .. import validate
 from ..engine.execution.launch import call, launch
+from ..engine.model import Model
+from ..engine.neighbors.lists import Neighbors
+from ..engine.state import State
 from ..kernels.constraints import boundary as kernels
 from ..kernels.constraints.boundary_shapes import Shape
 from ..kernels.constraints.rigid_motion import motion_type, pose_kernel, pose_type
 from .easing import EasedConstraint, Easing
 from .tuples import bodies
-
-if TYPE_CHECKING:
-    from ..engine.model import Model
-    from ..engine.neighbors.lists import Neighbors
-    from ..engine.state import State
 
 STILL = (0.0, 0.0, 0.0)
 

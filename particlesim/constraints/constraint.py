@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -12,18 +12,17 @@ import warp as wp
 from .. import validate
 from ..engine import topology
 from ..engine.execution.launch import launch
-from ..interactions.pair import as_law
+from ..engine.model import Model
+from ..engine.neighbors.lists import Neighbors
+from ..engine.probing.limit import Limit
+from ..engine.probing.probe import Probe
+from ..engine.state import State
 from ..kernels.constraints import constraints as kernels
-from .base import ConstraintBase
+from ..scene.law import law as make_law
+from ..scene.part import ConstraintBase, Part
+from .force import ConstraintForce
+from .limits import constraint_limits
 from .tuples import Tuples, bodies
-
-if TYPE_CHECKING:
-    from ..engine.model import Model
-    from ..engine.neighbors.lists import Neighbors
-    from ..engine.probing.probe import Probe
-    from ..engine.state import State
-    from ..instruments.stability.report import Limit
-    from .force import ConstraintForce
 
 OWN = ("compliance", "damping", "break_force")  # parameters of every constraint
 
@@ -86,7 +85,7 @@ class Constraint(ConstraintBase):
         break_force: Any = None,
         **parameters: Any,
     ):
-        self.law = as_law(law)
+        self.law = make_law(law)
         self.law.check_derivable(self.name)
         size = self._size(parameters)
         self.particles = topology.tuples(self.name, "particles", particles, size)
@@ -161,8 +160,6 @@ class Constraint(ConstraintBase):
         Raises:
             ValueError: A compliance of 0, whose force would be infinite; a ``break_force``.
         """
-        from .force import ConstraintForce
-
         return ConstraintForce(self)
 
     # The engine's side ------------------------------------------------------------------------
@@ -233,8 +230,6 @@ class Constraint(ConstraintBase):
 
     def limits(self, probe: Probe) -> list[Limit]:
         """None, as XPBD is implicit; how fast it damps is told."""
-        from .limits import constraint_limits
-
         return constraint_limits(self, probe)
 
     def persistent(self) -> dict[str, wp.array]:
@@ -257,31 +252,35 @@ class Constraint(ConstraintBase):
 
     # Reading ------------------------------------------------------------------------------------
 
+    def read_force(self, part: Part) -> np.ndarray:
+        if not self.count:
+            return np.zeros(0)
+        self._strain(may_break=False)
+        return self._listed(self.strain.numpy(), part)
+
+    def read_broken(self, part: Part) -> np.ndarray:
+        if self.count and self.break_force is not None:
+            return self._listed(self.struct.broken.numpy(), part) > 0
+        return self._listed(np.zeros(self.count), part) > 0
+
+    def _listed(self, rows: np.ndarray, part: Part) -> np.ndarray:
+        """Values of the sorted rows, of the worlds of ``part``, in the order of its tuples."""
+        values = np.empty_like(rows)
+        values[self.tuples.order] = rows
+        edges = self.tuples.edges
+        mine = [w for w, peer in enumerate(self.peers) if part is self or part is peer]
+        return np.concatenate([values[edges[w] : edges[w + 1]] for w in mine])
+
     @property
     def force(self) -> np.ndarray:
-        """Estimated force on the end that feels most of it, |lam| |grad C| / dt^2 [force], (m,).
-
-        Of the last substep; world by world where the constraint stands for several.
-        """
-        bound = self.bound
-        if bound.count:
-            bound._strain(may_break=False)
-            return self._listed(bound.strain.numpy())
-        return np.zeros(0)
+        """See ``Simulation.force``; only of ``sim.constraints``: a scene's may be in several."""
+        if "peers" not in self.__dict__:
+            raise self._elsewhere("force")
+        return self.read_force(self)
 
     @property
     def broken(self) -> np.ndarray:
-        """Which tuples have broken, (m,) bool, like :attr:`force`."""
-        bound = self.bound
-        if bound.count and bound.break_force is not None:
-            return self._listed(bound.struct.broken.numpy()) > 0
-        return self._listed(np.zeros(bound.count)) > 0
-
-    def _listed(self, rows: np.ndarray) -> np.ndarray:
-        """Values of the sorted rows in the order in which the tuples were given."""
-        bound = self.bound
-        values = np.empty_like(rows)
-        values[bound.tuples.order] = rows
-        edges = bound.tuples.edges
-        mine = [w for w, peer in enumerate(bound.peers) if self in (bound, peer)]
-        return np.concatenate([values[edges[w] : edges[w + 1]] for w in mine])
+        """See ``Simulation.broken``; only of ``sim.constraints``, like :attr:`force`."""
+        if "peers" not in self.__dict__:
+            raise self._elsewhere("broken")
+        return self.read_broken(self)

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from .. import validate
 from ..engine.execution.launch import call, launch, when
+from ..engine.model import Model
+from ..engine.neighbors.lists import Neighbors
+from ..engine.probing.limit import Limit
+from ..engine.probing.probe import Probe
+from ..engine.state import State
 from ..kernels.constraints import contact as kernels
 from ..kernels.constraints import contact_terms as terms
 from ..kernels.constraints.constraints import bodies_type
 from ..kernels.interactions.pair import pair_kernel
 from .easing import EasedConstraint, Easing
+from .limits import contact_limits
 from .tuples import bodies
-
-if TYPE_CHECKING:
-    from ..engine.model import Model
-    from ..engine.neighbors.lists import Neighbors
-    from ..engine.probing.probe import Probe
-    from ..engine.state import State
-    from ..instruments.stability.report import Limit
 
 CLOSEST = 1e-9  # parts of the cutoff: closer than this, particles count as coincident
 
@@ -250,6 +249,4 @@ class Contact(EasedConstraint):
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the speed of the particles against their radius."""
-        from .limits import contact_limits
-
         return contact_limits(self, probe)

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from .. import validate
 from ..engine import topology
+from ..engine.model import Model
 from ..kernels.constraints.constraints import distance_evaluation
 from ..scene.law import law
 from .constraint import Constraint
-
-if TYPE_CHECKING:
-    from ..engine.model import Model
 
 
 @law

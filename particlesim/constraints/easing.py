@@ -9,7 +9,7 @@ import warp as wp
 
 from ..engine.model import Model
 from ..kernels.constraints.easing import easing_type
-from .base import ConstraintBase
+from ..scene.part import ConstraintBase
 
 FRAMES = 30.0  # in which slack falls to 1/e, where the depenetration speed allows
 

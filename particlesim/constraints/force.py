@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from .. import validate
 from ..engine.execution.launch import launch
-from ..interactions.base import Interaction
+from ..engine.model import Model
+from ..engine.neighbors.lists import Neighbors
+from ..engine.state import State
 from ..kernels.constraints import constraint_force as kernels
+from ..scene.part import Interaction
 from .tuples import Tuples, bodies
-
-if TYPE_CHECKING:
-    from ..engine.model import Model
-    from ..engine.neighbors.lists import Neighbors
-    from ..engine.state import State
-    from .constraint import Constraint
 
 
 class ConstraintForce(Interaction):
@@ -40,7 +37,7 @@ class ConstraintForce(Interaction):
 
     requires = frozenset({"force"})
 
-    def __init__(self, constraint: Constraint):
+    def __init__(self, constraint: Any):
         self.constraint = constraint
         alpha = constraint.compliance
         if alpha.size and not alpha.min() > 0:

@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ..instruments.stability.report import Limit
-
-if TYPE_CHECKING:
-    from ..engine.probing.probe import Probe
-    from .boundary import BoxBoundary, SphereBoundary
-    from .constraint import Constraint
-    from .contact import Contact
+from ..engine.probing.limit import Limit
+from ..engine.probing.probe import Probe
 
 
-def contact_limits(part: Contact, probe: Probe) -> list[Limit]:
+def contact_limits(part: Any, probe: Probe) -> list[Limit]:
     """No particle may pass its own radius in a substep: v dt + a dt^2 <= R.
 
     Two that run into each other then come no further than to each other's middle, which contacts
@@ -40,14 +35,14 @@ def contact_limits(part: Contact, probe: Probe) -> list[Limit]:
     return [Limit(part.name, "speed", float(dt[k]), reason, *probe.place(int(rows[k])))]
 
 
-def box_limits(part: BoxBoundary, probe: Probe) -> list[Limit]:
+def box_limits(part: Any, probe: Probe) -> list[Limit]:
     """No particle may cross the box in a substep: |v| dt <= upper - lower, along each axis."""
 
     names = [f"width / v along {axis}" for axis in "xyz"]
     return _crossing(part, probe, names, lambda box, v: (box.upper - box.lower) / np.abs(v))
 
 
-def sphere_limits(part: SphereBoundary, probe: Probe) -> list[Limit]:
+def sphere_limits(part: Any, probe: Probe) -> list[Limit]:
     """No particle may pass the middle of an obstacle, or cross a container: |v| dt <= radius."""
 
     return _crossing(
@@ -83,7 +78,7 @@ def _crossing(
     return [min(found, key=lambda limit: limit.dt)] if found else []
 
 
-def constraint_limits(part: Constraint, probe: Probe) -> list[Limit]:
+def constraint_limits(part: Any, probe: Probe) -> list[Limit]:
     """XPBD takes any step, and damps: E falls by 1 / (1 + omega^2 dt^2) a substep.
 
     For constraints whose gradients are unit vectors omega^2 = sum w / alpha is known; the time in

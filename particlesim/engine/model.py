@@ -10,9 +10,11 @@ import warp as wp
 
 from .. import validate
 from ..kernels.engine.loops import Periodicity, box_type
-from ..kernels.precision import PRECISIONS, structure
-from ..scene.scene import Group, Scene
+from ..kernels.precision import PRECISIONS
+from ..scene.group import select
+from ..scene.scene import Scene
 from ..scene.settings import Settings
+from .structs import parameter_struct
 
 
 def choose_device(device: Any) -> Any:
@@ -27,30 +29,6 @@ def choose_device(device: Any) -> Any:
     raise validate.fail(
         "Simulation", "device", f"be one of {', '.join(there)}", str(device), "choose one"
     )
-
-
-def select(scene: Scene, group: Any, owner: str) -> np.ndarray:
-    """Sorted indices that ``group`` stands for: None (all), a Group, several, or indices."""
-    if group is None:
-        return np.arange(scene.particle_count)
-    if isinstance(group, Group):
-        if group.scene is not scene:
-            raise validate.fail(owner, "group", "belong to the scene", group, "use its own group")
-        return group.indices
-    if isinstance(group, list | tuple) and group and all(isinstance(g, Group) for g in group):
-        return np.unique(np.concatenate([select(scene, g, owner) for g in group]))
-    index = np.asarray(group)
-    if index.size == 0:
-        return np.zeros(0, dtype=np.int64)
-    if index.ndim != 1 or not np.issubdtype(index.dtype, np.integer):
-        raise validate.fail(owner, "group", "be groups or indices", group, "pass a Group")
-    if index.min() < 0 or index.max() >= scene.particle_count:
-        worst = index.max() if index.max() >= scene.particle_count else index.min()
-        raise validate.fail(
-            owner, "group", f"hold indices from 0 to {scene.particle_count - 1}", int(worst),
-            "index the scene's particles",
-        )  # fmt: skip
-    return np.unique(index)
 
 
 class Model:
@@ -76,6 +54,10 @@ class Model:
         self.periodic = self._periodicity()
         self.box = self._boxes()
         self.attributes = self._attributes()
+
+    def rows(self, world: int) -> slice:
+        """The rows of a world's particles."""
+        return slice(int(self.offsets[world]), int(self.offsets[world + 1]))
 
     @property
     def vectorised(self) -> bool:
@@ -167,14 +149,3 @@ class Model:
             for w, (scene, group) in enumerate(zip(self.scenes, groups, strict=True))
         ]
         return np.concatenate(chosen).astype(np.int32)
-
-
-_STRUCTS: dict[tuple, Any] = {}
-
-
-def parameter_struct(name: str, fields: tuple[tuple[str, Any], ...]) -> Any:
-    """The struct of these fields; the same one for the same fields, so kernels are reused."""
-    key = (name, fields)
-    if key not in _STRUCTS:
-        _STRUCTS[key] = structure(name, dict(fields))
-    return _STRUCTS[key]

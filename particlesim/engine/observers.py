@@ -6,6 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
+import warp as wp
+
 from .execution.launch import owner
 
 FORCE, PROJECT, FINISH = "force", "project", "finish"  # what a part is about to do, or has done
@@ -13,6 +16,8 @@ FORCE, PROJECT, FINISH = "force", "project", "finish"  # what a part is about to
 
 class Observer:
     """Told around every part of a substep. While a frame is recorded it may only launch."""
+
+    name = "observer"  # of what it keeps, in checkpoints
 
     def begin(self, dt: float) -> None:
         """A substep begins."""
@@ -26,20 +31,47 @@ class Observer:
     def end(self, dt: float) -> None:
         """The substep is done."""
 
+    def carried(self) -> list[wp.array]:
+        """What the next kick takes from the last evaluation of the forces, row by particle."""
+        return []
 
-class Observers(Observer):
-    """All observers of a simulation; mostly none."""
+    def persistent(self) -> dict[str, wp.array]:
+        """Arrays that outlive a substep, for snapshots and checkpoints."""
+        return {}
+
+    def readable(self) -> dict[str, wp.array]:
+        """Arrays of the last substep that users can read something from, for checkpoints."""
+        return {}
+
+    def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
+        """The world of each row of one of these arrays; None: its rows are no world's own."""
+        return None
+
+    @property
+    def memory(self) -> int:
+        """Bytes of all its arrays."""
+        return 0
+
+
+class Observers:
+    """All observers of a loop; mostly none."""
 
     def __init__(self) -> None:
         self.all: list[Observer] = []
 
     def begin(self, dt: float) -> None:
+        """A substep begins."""
         for each in self.all:
             each.begin(dt)
 
     def end(self, dt: float) -> None:
+        """The substep is done."""
         for each in self.all:
             each.end(dt)
+
+    def carried(self) -> list[wp.array]:
+        """What all of them take from one evaluation of the forces to the next."""
+        return [array for each in self.all for array in each.carried()]
 
     @contextmanager
     def acting(self, part: Any, stage: str) -> Iterator[None]:

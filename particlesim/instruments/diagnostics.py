@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import warp as wp
 
 from ..engine.execution.launch import launch
+from ..engine.source import Source
 from ..kernels.engine.reduce import QUANTITIES, block_sums_kernel
-
-if TYPE_CHECKING:
-    from ..simulation.simulation import Simulation
 
 BLOCK = 256  # particles summed by one thread
 
@@ -40,8 +37,8 @@ class Diagnostics:
         return self.kinetic + self.potential
 
 
-def measure(sim: Simulation, potentials: list[np.ndarray] | None = None) -> Diagnostics:
-    """The diagnostics of the simulation's present state.
+def measure(sim: Source, potentials: list[np.ndarray] | None = None) -> Diagnostics:
+    """The diagnostics of the present state.
 
     Args:
         sim: The simulation.

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from ..engine.execution.launch import Launch, When
-
-if TYPE_CHECKING:
-    from ..simulation.simulation import Simulation
+from ..engine.frames import Frames
 
 
 @dataclass(frozen=True)
@@ -60,30 +57,33 @@ def kernel_name(operation: Launch) -> str:
     return str(operation.kernel.key).rpartition("__")[2]
 
 
-def explain(sim: Simulation) -> Explanation:
-    """Describe a simulation."""
-    count = max(1, sim.particle_count)
-    frame = sim.executor.frame
+def explain(frames: Frames) -> Explanation:
+    """Describe what a loop's frames take."""
+    loop, model = frames.loop, frames.loop.model
+    count = max(1, model.particle_count)
+    executor = frames.executor(loop.settings.substeps)
+    frame = executor.frame
     always, sometimes = [], []
     for operation in frame.substep.operations:
         if isinstance(operation, When):
             sometimes += [(o.owner, kernel_name(o), o.dim) for o in operation.body.launches()]
         elif isinstance(operation, Launch):
             always.append((operation.owner, kernel_name(operation), operation.dim))
-    arrays = {name: a.capacity / count for name, a in sim.state.arrays.items()}
-    if sim.accounts is not None:
-        arrays["(ledger)"] = sim.accounts.memory / count
-    total = sum(arrays.values()) + sum(each.memory for each in sim.neighbors.lists) / count
-    chosen = sim.executor.chosen
-    worlds = f"{sim.world_count} worlds of " if sim.world_count > 1 else ""
+    arrays = {name: a.capacity / count for name, a in loop.state.arrays.items()}
+    for observer in loop.observers.all:
+        arrays[f"({observer.name})"] = observer.memory / count
+    total = sum(arrays.values()) + sum(each.memory for each in loop.neighbors.lists) / count
+    chosen = executor.chosen
+    worlds = f"{model.world_count} worlds of " if model.world_count > 1 else ""
     return Explanation(
         title=(
-            f"{worlds}{sim.particle_count // max(1, sim.world_count)} particles on {sim.device}, "
-            f"{sim.settings.precision}, {sim.integrator.name}, {sim.settings.substeps} substeps "
-            f"of {sim.settings.substep:g}"
+            f"{worlds}{model.particle_count // max(1, model.world_count)} particles on "
+            f"{model.device}, "
+            f"{loop.settings.precision}, {loop.integrator.name}, {loop.settings.substeps} substeps "
+            f"of {loop.settings.substep:g}"
         ),
         arrays=arrays,
-        lists=[each.describe() for each in sim.neighbors.lists],
+        lists=[each.describe() for each in loop.neighbors.lists],
         launches=always,
         conditional=sometimes,
         bytes_per_particle=total,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -12,14 +12,12 @@ from ..constraints.boundary_base import Boundary
 from ..constraints.constraint import Constraint
 from ..constraints.contact import Contact
 from ..engine.execution.launch import launch
+from ..engine.source import Source
 from ..kernels.constraints.rigid_motion import pose_kernel
 from ..kernels.instruments import residual as kernels
 
-if TYPE_CHECKING:
-    from ..simulation.simulation import Simulation
 
-
-def residuals(constraint: Any, sim: Simulation) -> tuple[np.ndarray, np.ndarray] | None:
+def residuals(constraint: Any, sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
     """By how much a constraint is missed at the present positions.
 
     Args:
@@ -35,12 +33,12 @@ def residuals(constraint: Any, sim: Simulation) -> tuple[np.ndarray, np.ndarray]
 
 
 @functools.singledispatch
-def _residuals(constraint: Any, sim: Simulation) -> tuple[np.ndarray, np.ndarray] | None:
+def _residuals(constraint: Any, sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
     return None
 
 
 @_residuals.register(Constraint)
-def _of_tuples(constraint: Constraint, sim: Simulation) -> tuple[np.ndarray, np.ndarray] | None:
+def _of_tuples(constraint: Constraint, sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
     if not constraint.count:
         return None
     model, tuples = sim.model, constraint.tuples
@@ -53,7 +51,7 @@ def _of_tuples(constraint: Constraint, sim: Simulation) -> tuple[np.ndarray, np.
 
 
 @_residuals.register(Boundary)
-def _of_boundary(constraint: Boundary, sim: Simulation) -> tuple[np.ndarray, np.ndarray] | None:
+def _of_boundary(constraint: Boundary, sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
     if not constraint.count:
         return None
     model = sim.model
@@ -69,7 +67,7 @@ def _of_boundary(constraint: Boundary, sim: Simulation) -> tuple[np.ndarray, np.
 
 
 @_residuals.register(Contact)
-def _of_contacts(constraint: Contact, sim: Simulation) -> tuple[np.ndarray, np.ndarray] | None:
+def _of_contacts(constraint: Contact, sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
     if not constraint.count:
         return None
     model, pairs = sim.model, constraint.pairs.pairs
@@ -78,7 +76,7 @@ def _of_contacts(constraint: Contact, sim: Simulation) -> tuple[np.ndarray, np.n
     return _run(kernel, constraint.count, inputs, sim), pairs.world.numpy()
 
 
-def _run(kernel: wp.Kernel, count: int, inputs: list[Any], sim: Simulation) -> np.ndarray:
-    out = wp.zeros(count, dtype=sim.model.precision.scalar, device=sim.device)
-    launch(kernel, count, [*inputs, out], sim.device)
+def _run(kernel: wp.Kernel, count: int, inputs: list[Any], sim: Source) -> np.ndarray:
+    out = wp.zeros(count, dtype=sim.model.precision.scalar, device=sim.model.device)
+    launch(kernel, count, [*inputs, out], sim.model.device)
     return out.numpy().astype(np.float64)

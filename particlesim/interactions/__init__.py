@@ -1,6 +1,6 @@
 """Interactions: what acts at the start of a substep."""
 
-from .base import Interaction
+from ..scene.part import Interaction
 from .fluid.equations_of_state import Polytrope, Tait
 from .fluid.sph import SPH
 from .fluid.viscosities import ArtificialViscosity

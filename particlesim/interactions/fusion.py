@@ -8,20 +8,19 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ..engine.execution.launch import launch
+from ..engine.neighbors.lists import Neighbors
+from ..engine.state import State
+from ..engine.structs import filled
 from ..kernels.interactions import pair as kernels
 from ..kernels.precision import Precision, structure
-from .base import Interaction
-from .pair import Pair, filled
-
-if TYPE_CHECKING:
-    from ..engine.neighbors.lists import Neighbors
-    from ..engine.state import State
+from ..scene.part import Interaction
+from .pair import Pair
 
 
 class FusedPairs(Interaction):

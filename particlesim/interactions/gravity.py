@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import warp as wp
 
 from .. import validate
+from ..engine.probing.limit import Limit
+from ..engine.probing.probe import Probe
 from ..scene.law import law
+from .gravity_limits import closest_approach, closest_passage
 from .pair import Pair
-
-if TYPE_CHECKING:
-    from ..engine.probing.probe import Probe
-    from ..instruments.stability.report import Limit
 
 
 @law
@@ -52,8 +51,5 @@ class Gravity(Pair):
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the tide now, by orbits' pericentres, and by passages at the softening length."""
-        from .orbit_limits import closest_approach
-        from .pair_limits import closest_passage
-
         limits = probe.response(self) + closest_passage(self, probe)
         return limits + closest_approach(self, probe)

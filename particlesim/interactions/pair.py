@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from .. import validate
 from ..engine.execution.launch import launch
+from ..engine.model import Model
+from ..engine.neighbors.all_pairs import AllPairs
+from ..engine.neighbors.lists import Neighbors
+from ..engine.probing.limit import Limit
+from ..engine.probing.probe import Probe
+from ..engine.state import State
+from ..engine.structs import filled, structure_of
 from ..kernels.interactions import pair as kernels
-from ..kernels.precision import structure
 from ..scene.law import Law
 from ..scene.law import law as make_law
-from .base import Arguments, Interaction
-
-if TYPE_CHECKING:
-    from ..engine.model import Model
-    from ..engine.neighbors.all_pairs import AllPairs
-    from ..engine.neighbors.lists import Neighbors
-    from ..engine.probing.probe import Probe
-    from ..engine.state import State
-    from ..instruments.stability.report import Limit
+from ..scene.part import Interaction
+from .arguments import Arguments
+from .pair_limits import collisions
 
 # Closer than this, particles count as coincident: in parts of the cutoff, and without a cutoff.
 COINCIDENT, CLOSEST = 1e-6, 1e-12
@@ -156,8 +156,6 @@ class Pair(Interaction):
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the gradient at the present distances and, within a cutoff, at those to come."""
-        from .pair_limits import collisions
-
         return probe.response(self) + ([] if self.cutoff is None else collisions(self, probe))
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
@@ -194,7 +192,7 @@ class PairPotential(Pair):
     """
 
     def __init__(self, law: Any, group: Any = None, *, cutoff: float | None, **parameters: Any):
-        super().__init__(as_law(law), None, group, cutoff, parameters)
+        super().__init__(make_law(law), None, group, cutoff, parameters)
 
 
 class PairForce(Pair):
@@ -211,30 +209,4 @@ class PairForce(Pair):
     """
 
     def __init__(self, law: Any, group: Any = None, *, cutoff: float | None, **parameters: Any):
-        super().__init__(None, as_law(law), group, cutoff, parameters)
-
-
-def as_law(value: Any) -> Law:
-    """A law, or a plain function made one."""
-    return make_law(value)
-
-
-def structure_of(name: str, fields: dict[str, wp.array]) -> Any:
-    """The struct type that holds these arrays, the same one for the same types."""
-    key = (name, tuple((field, array.dtype) for field, array in fields.items()))
-    if key not in _STRUCTS:
-        _STRUCTS[key] = structure(
-            name, {field: wp.array(dtype=array.dtype) for field, array in fields.items()}
-        )
-    return _STRUCTS[key]
-
-
-_STRUCTS: dict[tuple[Any, ...], Any] = {}
-
-
-def filled(kind: Any, fields: dict[str, wp.array]) -> Any:
-    """An instance of a struct with its arrays set."""
-    result = kind()
-    for name, array in fields.items():
-        setattr(result, name, array)
-    return result
+        super().__init__(None, make_law(law), group, cutoff, parameters)

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ..engine.execution.launch import launch
-from ..instruments.stability.report import Limit, explicit_step
+from ..engine.probing.limit import Limit, explicit_step
+from ..engine.probing.probe import Probe
+from ..engine.structs import filled
 from ..kernels.engine.loops import Pairs
-
-if TYPE_CHECKING:
-    from ..engine.probing.probe import Probe
-    from .gravity import Gravity
-    from .pair import Pair
 
 POINTS = 1024  # distances at which a law is asked, from the cutoff inwards
 NEAREST = 1e-3  # of the cutoff
@@ -24,7 +21,7 @@ GAIN = 1e-3  # of its energy that a collision may gain on average
 TRIALS, FINER, PHASES = 32, 0.9, 64  # steps tried, each 0.9 of the last; starts within a step
 
 
-def collisions(part: Pair, probe: Probe) -> list[Limit]:
+def collisions(part: Any, probe: Probe) -> list[Limit]:
     """The step at which particles that run into each other gain energy from the integrator.
 
     The fastest particle meets one of typical speed, in the frame of their world. Laws that do not
@@ -54,13 +51,13 @@ def collisions(part: Pair, probe: Probe) -> list[Limit]:
     return [min(found, key=lambda limit: limit.dt)] if found else []
 
 
-def _alike(peer: Pair, probe: Probe, rows: np.ndarray) -> tuple[Any, ...]:
+def _alike(peer: Any, probe: Probe, rows: np.ndarray) -> tuple[Any, ...]:
     """What worlds have in common whose collisions differ by nothing but speed."""
     values = {name: np.asarray(value).tolist() for name, value in peer.parameters.items()}
     return (peer.cutoff, str(values), float(probe.inverse_mass[rows].max()))
 
 
-def _of_world(part: Pair, probe: Probe, w: int, members: np.ndarray, speed: float) -> Limit | None:
+def _of_world(part: Any, probe: Probe, w: int, members: np.ndarray, speed: float) -> Limit | None:
     if speed == 0.0:
         return None
     couples = _couples(part, probe, members)
@@ -114,7 +111,7 @@ def largest_step(r: np.ndarray, a: np.ndarray, speed: float, most: float) -> flo
     return float(dt[max(int(np.argmax(gained)) - 1, 0), 0]) if gained.any() else most
 
 
-def _couples(part: Pair, probe: Probe, members: np.ndarray) -> np.ndarray:
+def _couples(part: Any, probe: Probe, members: np.ndarray) -> np.ndarray:
     """Pairs to ask the law with, (k, 2): the two lightest, and some more if they are not alike."""
     lightest = members[np.argsort(-probe.inverse_mass[members], kind="stable")[:2]]
     if not part.quantities:
@@ -124,7 +121,7 @@ def _couples(part: Pair, probe: Probe, members: np.ndarray) -> np.ndarray:
     return np.array([lightest, *others])
 
 
-def forces(part: Pair, probe: Probe, w: int, couples: np.ndarray, r: np.ndarray) -> np.ndarray:
+def forces(part: Any, probe: Probe, w: int, couples: np.ndarray, r: np.ndarray) -> np.ndarray:
     """F(r) of each couple by the part's own kernel, (couples, distances).
 
     Every couple at every distance is two slots that have each other for their only neighbour.
@@ -146,29 +143,8 @@ def forces(part: Pair, probe: Probe, w: int, couples: np.ndarray, r: np.ndarray)
         source = probe.state[name]
         fields[name] = model.array(source.numpy()[particle], source.dtype)
     f = wp.zeros(2 * count, dtype=precision.vec3, device=model.device)
-    inputs = [pairs, model.box, part.params, _filled(part.Data, fields),
-              _filled(part.Out, {"f": f})]  # fmt: skip
+    inputs = [pairs, model.box, part.params, filled(part.Data, fields),
+              filled(part.Out, {"f": f})]  # fmt: skip
     launch(part.kernel, 2 * count, inputs, model.device)
     values = f.numpy()[1::2, 0].astype(np.float64).reshape(len(couples), len(r))
     return np.clip(np.nan_to_num(values), -LARGEST, LARGEST)
-
-
-def _filled(kind: Any, fields: dict[str, wp.array]) -> Any:
-    result = kind()
-    for name, array in fields.items():
-        setattr(result, name, array)
-    return result
-
-
-def closest_passage(part: Gravity, probe: Probe) -> list[Limit]:
-    """The heaviest two at the softening length's depth: omega^2 = G (m_i + m_j) / s^3."""
-    found = []
-    for w, peer in enumerate(part.peers):
-        members = part.pairs.members_host[probe.model.world_of[part.pairs.members_host] == w]
-        s, G = peer.parameters["softening"], abs(peer.parameters["constant"])
-        mass = np.sort(probe.mass[members])[-2:]
-        if s > 0 and G > 0 and len(mass) == 2:
-            omega = float(np.sqrt(G * mass.sum() / s**3))
-            reason = f"2 / omega, omega = {omega:.4g} /s = sqrt(G (m_i + m_j) / softening^3)"
-            found.append(Limit(part.name, "passage", 2.0 / omega, reason, w))
-    return [min(found, key=lambda limit: limit.dt)] if found else []

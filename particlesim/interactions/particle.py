@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from .. import validate
 from ..engine.execution.launch import launch
+from ..engine.model import Model
+from ..engine.neighbors.lists import Neighbors
+from ..engine.state import State
+from ..engine.structs import filled, structure_of
 from ..kernels.interactions import particle as kernels
 from ..scene.law import Law, law
-from .base import Arguments, Interaction
-from .pair import as_law, filled, structure_of
-
-if TYPE_CHECKING:
-    from ..engine.model import Model
-    from ..engine.neighbors.lists import Neighbors
-    from ..engine.state import State
+from ..scene.law import law as make_law
+from ..scene.part import Interaction
+from .arguments import Arguments
 
 
 class ParticleForce(Interaction):
@@ -45,8 +45,8 @@ class ParticleForce(Interaction):
     def __init__(
         self, law: Any, group: Any = None, *, potential: Any = None, **parameters: Any
     ) -> None:
-        self.law, self.group = as_law(law), group
-        self.potential = None if potential is None else as_law(potential)
+        self.law, self.group = make_law(law), group
+        self.potential = None if potential is None else make_law(potential)
         laws = [self.law] if self.potential is None else [self.law, self.potential]
         taken = {name for each in laws for name in each.parameters}
         validate.known(self.name, parameters, taken, f"parameter of {self.law.name}")

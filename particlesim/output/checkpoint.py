@@ -16,24 +16,21 @@ import os
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from .. import validate
 from ..engine import batch
+from ..engine.frames import Frames
 from ..instruments.watchdog.incident import Incident
+from ..instruments.watchdog.watch import Watchdog
+from ..scene import __version__
 from ..scene.fingerprint import difference, fingerprint
 from ..scene.scene import Scene
 from ..scene.settings import Settings
 from . import files
 
-if TYPE_CHECKING:
-    import warp as wp
-
-    from ..simulation.simulation import Simulation
-
-Kind = TypeVar("Kind", bound="Simulation")
 FORMAT, VERSION = "particlesim checkpoint", 1
 HEADER = "header"
 # What the arrays mean depends on these: which there are, their type, and the time of a frame.
@@ -48,35 +45,37 @@ class Capture:
     arrays: dict[str, np.ndarray]
 
 
-def save(sim: Simulation, path: str | os.PathLike[str], overwrite: bool) -> None:
-    """Write the present of ``sim`` (see :meth:`Simulation.save`)."""
+def save(frames: Frames, watchdog: Watchdog, path: str | os.PathLike[str], overwrite: bool) -> None:
+    """Write the present (see :meth:`Simulation.save`)."""
     target = _writable(path, overwrite)
-    _publish(target, capture(sim))
+    _publish(target, capture(frames, watchdog))
 
 
-def capture(sim: Simulation, scenes: dict[str, Any] | None = None, state: bool = True) -> Capture:
+def capture(
+    frames: Frames, watchdog: Watchdog, scenes: dict[str, Any] | None = None, state: bool = True
+) -> Capture:
     """Copy what a checkpoint holds.
 
     Args:
-        sim: The simulation.
-        scenes: Its fingerprint, if it is known: it does not change.
+        frames: With the loop and what outlives its substeps.
+        watchdog: With what it has found and done.
+        scenes: Their fingerprint, if it is known: it does not change.
         state: False leaves the arrays out, for a run that is at its start.
     """
-    from .. import __version__
-
-    held = contents(sim) if state else {}
+    loop = frames.loop
+    held = frames.snapshot.contents() if state else {}
     arrays = {name: array.numpy().copy() for name, array in held.items()}
     header = {
         "format": FORMAT,
         "format_version": VERSION,
         "particlesim": __version__,
-        "frame": sim.frame,
-        "unknown_forces": sorted(sim._unknown_forces),
-        "frozen": sim.frozen,
-        "incidents": [dataclasses.asdict(incident) for incident in sim.incidents],
-        "settings": dataclasses.asdict(sim.settings),
-        "copies": all(scene is sim.scenes[0] for scene in sim.scenes),
-        "scenes": fingerprint(sim.scenes) if scenes is None else scenes,
+        "frame": loop.frame,
+        "unknown_forces": sorted(loop.unknown_forces),
+        "frozen": sorted(watchdog.frozen),
+        "incidents": [dataclasses.asdict(incident) for incident in watchdog.incidents],
+        "settings": dataclasses.asdict(loop.settings),
+        "copies": all(scene is loop.scenes[0] for scene in loop.scenes),
+        "scenes": fingerprint(loop.scenes) if scenes is None else scenes,
         "arrays": list(arrays),
     }
     return Capture(header, arrays)
@@ -96,26 +95,24 @@ def read(path: Path) -> Capture:
     return Capture(*_read(path))
 
 
-def restore(sim: Simulation, saved: Capture, source: Path) -> None:
-    """Put ``sim``, of the same scenes and settings, to where a checkpoint was captured."""
-    _fill(sim, saved.arrays, source)
-    sim.frame = saved.header["frame"]
-    sim._unknown_forces = set(saved.header["unknown_forces"])
-    sim.incidents = [Incident.of_saved(each) for each in saved.header.get("incidents", ())]
-    sim.watchdog.resume(sim, saved.header.get("frozen", ()))
+def restore(frames: Frames, watchdog: Watchdog, saved: Capture, source: Path) -> None:
+    """Put a loop, of the same scenes and settings, to where a checkpoint was captured."""
+    loop = frames.loop
+    _fill(frames, saved.arrays, source)
+    loop.frame = saved.header["frame"]
+    loop.unknown_forces = set(saved.header["unknown_forces"])
+    watchdog.incidents = [Incident.of_saved(each) for each in saved.header.get("incidents", ())]
+    watchdog.resume(frames, saved.header.get("frozen", ()))
 
 
-def load(
-    kind: type[Kind],
-    path: str | os.PathLike[str],
+def check(
+    saved: Capture,
+    source: Path,
     scene: Scene | Sequence[Scene],
     settings: Settings | None,
-    device: Any,
     worlds: int | None,
-) -> Kind:
-    """The simulation that a file holds (see :meth:`Simulation.load`)."""
-    source = Path(path)
-    saved = read(source)
+) -> tuple[list[Scene], Settings]:
+    """The scenes and settings to go on with from a file (see :meth:`Simulation.load`)."""
     header = saved.header
     if not saved.arrays:
         raise validate.fail(
@@ -127,27 +124,12 @@ def load(
     scenes = batch.scenes(scene, worlds)
     found = difference(header["scenes"], fingerprint(scenes))
     if found:
-        where, saved, given = found
+        where, before, given = found
         raise validate.fail(
-            "Simulation.load", where, f"be as in {source.name!r}, {_short(saved)}", given,
+            "Simulation.load", where, f"be as in {source.name!r}, {_short(before)}", given,
             "give the scenes that were saved",
         )  # fmt: skip
-    sim = kind(scenes, _settings(source, header["settings"], settings), device)
-    restore(sim, saved, source)
-    return sim
-
-
-def contents(sim: Simulation) -> dict[str, wp.array]:
-    """The arrays that a checkpoint holds, by their names in the file."""
-    state = sim.state.arrays
-    found = {f"state/{name}": array for name, array in state.items() if name != "world"}
-    for name, array in sim.snapshot.arrays.items():
-        if state.get(name) is not array:
-            found[f"kept/{name}"] = array
-    for k, constraint in enumerate(sim.constraints):
-        for name, array in constraint.readable().items():
-            found[f"read/constraint_{k}_{name}"] = array
-    return found
+    return scenes, _settings(source, header["settings"], settings)
 
 
 def _settings(source: Path, saved: dict[str, Any], given: Settings | None) -> Settings:
@@ -174,12 +156,14 @@ def _settings(source: Path, saved: dict[str, Any], given: Settings | None) -> Se
     return given
 
 
-def _fill(sim: Simulation, arrays: dict[str, np.ndarray], source: Path) -> None:
-    """Put the arrays of a file into a simulation that is at its start."""
+def _fill(frames: Frames, arrays: dict[str, np.ndarray], source: Path) -> None:
+    """Put the arrays of a file into a loop that is at its start."""
     # Some arrays are made only when something asks for them, as the diagnostics do.
     prefix = "state/"
-    sim.state.require(name.removeprefix(prefix) for name in arrays if name.startswith(prefix))
-    targets = contents(sim)
+    frames.loop.state.require(
+        name.removeprefix(prefix) for name in arrays if name.startswith(prefix)
+    )
+    targets = frames.snapshot.contents()
     if targets.keys() != arrays.keys():
         raise _unfit(source, f"differs in {sorted(targets.keys() ^ arrays.keys())}")
     for name, target in targets.items():
@@ -189,7 +173,7 @@ def _fill(sim: Simulation, arrays: dict[str, np.ndarray], source: Path) -> None:
                 source, f"has {there.dtype} {there.shape} for {here.dtype} {here.shape} in {name}"
             )
         target.assign(there)
-    for each in sim.neighbors.verlet:
+    for each in frames.loop.neighbors.verlet:
         each.mark_all()
         each.rebuild()
         each.grow()

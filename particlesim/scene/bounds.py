@@ -1,4 +1,4 @@
-"""Bounds of a scene: what its particles are to stay in, or the watchdog barks."""
+"""Boxes of a scene: what its particles are to stay in, and the one that repeats itself."""
 
 from __future__ import annotations
 
@@ -36,3 +36,32 @@ def _corner(name: str, given: Any, side: float) -> np.ndarray:
     plain = [0.0 if on else value for on, value in zip(opened, values, strict=True)]
     corner = validate.vector("Scene", f"bounds {name}", plain, unit="length")
     return np.where(opened, side, corner)
+
+
+def periodic_box(periodic: Any) -> tuple[np.ndarray, np.ndarray, tuple[bool, bool, bool]] | None:
+    """Lower corner, upper corner and which axes are periodic; zeros on open axes."""
+    if periodic is None:
+        return None
+    owner = "Scene"
+    try:
+        lengths = [len(corner) for corner in periodic]
+    except TypeError:
+        lengths = []
+    if lengths != [3, 3]:
+        raise validate.fail(
+            owner, "periodic", "be (lower, upper), three each", periodic, "give both corners"
+        )
+    on = [lo is not None and hi is not None for lo, hi in zip(*periodic, strict=True)]
+    lower = validate.vector(
+        owner, "periodic lower", [a if k else 0 for a, k in zip(periodic[0], on, strict=True)]
+    )
+    upper = validate.vector(
+        owner, "periodic upper", [a if k else 0 for a, k in zip(periodic[1], on, strict=True)]
+    )
+    if not any(on):
+        return None
+    if (upper - lower)[on].min() <= 0:
+        raise validate.fail(
+            owner, "periodic", "have its upper corner above the lower", periodic, "swap them"
+        )
+    return lower, upper, (on[0], on[1], on[2])

@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ..engine.model import select
-from ..interactions.base import Bindable
+from .group import Group, select
 from .law import Law
-from .scene import Group, Scene
+from .part import Part
+from .scene import Scene
 
 ABSENT = "nothing"
 
@@ -91,7 +91,7 @@ def _content(value: Any) -> Any:
         return {str(name): _content(each) for name, each in value.items()}
     if isinstance(value, tuple | list):
         return [_content(each) for each in value]
-    if isinstance(value, Bindable) or dataclasses.is_dataclass(value):
+    if isinstance(value, Part) or dataclasses.is_dataclass(value):
         return value.__name__ if isinstance(value, type) else _contents(value)
     if isinstance(value, np.generic):
         value = value.item()
@@ -147,7 +147,7 @@ def _scene(scene: Scene) -> dict[str, Any]:
     }
 
 
-def _part(scene: Scene, part: Bindable) -> dict[str, Any]:
+def _part(scene: Scene, part: Part) -> dict[str, Any]:
     """An interaction or constraint by its kind and its public attributes."""
     found: dict[str, Any] = {"name": part.name, "kind": _plain(part.kind())}
     for name, value in sorted(vars(part).items()):
@@ -159,7 +159,7 @@ def _part(scene: Scene, part: Bindable) -> dict[str, Any]:
             found["parameters"] = {key: _array(np.asarray(each)) for key, each in value.items()}
         elif isinstance(value, np.ndarray):
             found[name] = _array(value)
-        elif isinstance(value, Bindable):
+        elif isinstance(value, Part):
             found[name] = _part(scene, value)
     return found
 

@@ -2,72 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from .. import validate
-from .bounds import corners
-
-if TYPE_CHECKING:
-    from ..constraints.base import ConstraintBase
-    from ..interactions.base import Interaction
+from .bounds import corners, periodic_box
+from .group import PALETTE, Group
+from .part import ConstraintBase, Interaction
 
 # Names of the engine's own per-particle arrays, which attributes of a scene cannot take.
 RESERVED = frozenset(
     "position velocity mass inverse_mass radius force world density pressure correction image "
     "previous_position position_error velocity_error time dt x".split()
 )
-Color = tuple[float, float, float]
-PALETTE: tuple[Color, ...] = (
-    (0.26, 0.52, 0.86), (0.90, 0.45, 0.20), (0.35, 0.70, 0.40), (0.80, 0.30, 0.45),
-    (0.60, 0.45, 0.80), (0.85, 0.70, 0.25), (0.40, 0.70, 0.75), (0.60, 0.55, 0.50),
-)  # fmt: skip
-
-
-class Group:
-    """A run of particles of a scene, made by one ``add_particles``.
-
-    ``group[k]`` is the index in the scene of the group's k-th particle; slices and arrays give
-    arrays of indices, ready for pairs and constraints. ``triangles`` (t, 3) int, counted within the
-    group, is the surface that it is drawn as; None: it is drawn as points.
-    """
-
-    def __init__(
-        self,
-        scene: Scene,
-        name: str,
-        start: int,
-        stop: int,
-        color: Color,
-        triangles: np.ndarray | None = None,
-    ):
-        self.scene, self.name, self.start, self.stop = scene, name, start, stop
-        self.color, self.triangles = color, triangles
-
-    def __len__(self) -> int:
-        return self.stop - self.start
-
-    def __iter__(self) -> Iterator[int]:
-        return iter(range(self.start, self.stop))
-
-    def __getitem__(self, key: Any) -> Any:
-        picked = self.indices[key]
-        return int(picked) if np.isscalar(picked) or picked.ndim == 0 else picked
-
-    def __repr__(self) -> str:
-        return f"Group({self.name!r}, {len(self)} particles)"
-
-    @property
-    def indices(self) -> np.ndarray:
-        """Indices of the group's particles in the scene, (n,) int."""
-        return np.arange(self.start, self.stop)
-
-    @property
-    def slice(self) -> slice:
-        """The group's rows in the scene's arrays."""
-        return slice(self.start, self.stop)
 
 
 class Scene:
@@ -99,7 +48,7 @@ class Scene:
         self.meters_per_unit = validate.number(
             "Scene", "meters_per_unit", meters_per_unit, above=0.0, unit="m"
         )
-        self.periodic = _box(periodic)
+        self.periodic = periodic_box(periodic)
         self.bounds = corners(bounds)
         self.groups: list[Group] = []
         self.interactions: list[Interaction] = []
@@ -196,7 +145,7 @@ class Scene:
 
     def add_interaction(self, interaction: Interaction) -> Interaction:
         """Add a force; it acts at the start of every substep, in the order of adding."""
-        from ..interactions.base import Interaction
+        from .part import Interaction
 
         if not isinstance(interaction, Interaction):
             raise TypeError(
@@ -208,7 +157,7 @@ class Scene:
 
     def add_constraint(self, constraint: ConstraintBase) -> ConstraintBase:
         """Add a constraint; it projects positions after integration, in the order of adding."""
-        from ..constraints.base import ConstraintBase
+        from .part import ConstraintBase
 
         if not isinstance(constraint, ConstraintBase):
             raise TypeError(
@@ -265,35 +214,6 @@ class Scene:
                 return group
         names = [group.name for group in self.groups]
         raise KeyError(f"Scene: group must be one of {names}, got {name!r}; choose one of these.")
-
-
-def _box(periodic: Any) -> tuple[np.ndarray, np.ndarray, tuple[bool, bool, bool]] | None:
-    """Lower corner, upper corner and which axes are periodic; zeros on open axes."""
-    if periodic is None:
-        return None
-    owner = "Scene"
-    try:
-        lengths = [len(corner) for corner in periodic]
-    except TypeError:
-        lengths = []
-    if lengths != [3, 3]:
-        raise validate.fail(
-            owner, "periodic", "be (lower, upper), three each", periodic, "give both corners"
-        )
-    on = [lo is not None and hi is not None for lo, hi in zip(*periodic, strict=True)]
-    lower = validate.vector(
-        owner, "periodic lower", [a if k else 0 for a, k in zip(periodic[0], on, strict=True)]
-    )
-    upper = validate.vector(
-        owner, "periodic upper", [a if k else 0 for a, k in zip(periodic[1], on, strict=True)]
-    )
-    if not any(on):
-        return None
-    if (upper - lower)[on].min() <= 0:
-        raise validate.fail(
-            owner, "periodic", "have its upper corner above the lower", periodic, "swap them"
-        )
-    return lower, upper, (on[0], on[1], on[2])
 
 
 def _bounded(

@@ -3,59 +3,178 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
+from ..engine.frames import Frames
+from ..engine.integrators import Integrator
+from ..engine.loop import Loop
+from ..engine.model import Model
+from ..engine.neighbors.lists import Neighbors
+from ..engine.state import State
 from ..instruments.diagnostics import Diagnostics, measure
 from ..instruments.explain import Explanation, explain
+from ..instruments.ledger.accounts import Accounts
 from ..instruments.ledger.ledger import Ledger, read
 from ..instruments.stability.check import stability
 from ..instruments.stability.report import Stability
+from ..instruments.watchdog.incident import Incident
+from ..instruments.watchdog.watch import Watchdog
+from ..interactions.fluid.interpolation import interpolate
+from ..interactions.fluid.sph import SPH
 from ..output import checkpoint
 from ..pictures.render.camera import Camera
 from ..pictures.render.image import Image
-from .access import Access
-from .world import World
-
-if TYPE_CHECKING:
-    from .simulation import Simulation
+from ..scene.part import ConstraintBase, Interaction
+from ..scene.scene import Scene
+from ..scene.settings import Settings
+from .world import Access, World
+from .writer import Writer
 
 
 class Reading(Access):
-    """The part of :class:`~particlesim.Simulation` that leaves it as it is."""
+    """The part of :class:`~particlesim.Simulation` that leaves it as it is.
+
+    It is made of a loop, what runs its frames, and its instruments; none of them knows it.
+    """
+
+    loop: Loop
+    frames: Frames
+    watchdog: Watchdog
+    accounts: Accounts | None
+    writer: Writer
 
     @property
-    def _sim(self) -> Simulation:
-        return cast("Simulation", self)
+    def scenes(self) -> Sequence[Scene]:
+        """The scenes, one for each world."""
+        return self.loop.scenes
+
+    @property
+    def settings(self) -> Settings:
+        """The knobs, with numbers in the place of what was ``"auto"``."""
+        return self.loop.settings
+
+    @property
+    def model(self) -> Model:
+        """Worlds, particles, device and precision."""
+        return self.loop.model
+
+    @property
+    def device(self) -> Any:
+        """The Warp device."""
+        return self.loop.model.device
+
+    @property
+    def state(self) -> State:
+        """The per-particle arrays on the device."""
+        return self.loop.state
+
+    @property
+    def neighbors(self) -> Neighbors:
+        """The pair lists."""
+        return self.loop.neighbors
+
+    @property
+    def interactions(self) -> Sequence[Interaction]:
+        """The interactions, each bound to all worlds."""
+        return self.loop.interactions
+
+    @property
+    def constraints(self) -> Sequence[ConstraintBase]:
+        """The constraints, each bound to all worlds."""
+        return self.loop.constraints
+
+    @property
+    def integrator(self) -> Integrator:
+        """What moves the particles."""
+        return self.loop.integrator
+
+    @property
+    def incidents(self) -> list[Incident]:
+        """What the watchdog has found, and done about it."""
+        return self.watchdog.incidents
 
     @property
     def frozen(self) -> list[int]:
         """Worlds that stand still since the watchdog froze them; :meth:`reset` frees them."""
-        return sorted(self._sim.watchdog.frozen)
+        return sorted(self.watchdog.frozen)
 
     @property
     def world_count(self) -> int:
         """How many worlds."""
-        return self._sim.model.world_count
+        return self.loop.model.world_count
 
     @property
     def particle_count(self) -> int:
         """Particles of all worlds."""
-        return self._sim.model.particle_count
+        return self.loop.model.particle_count
+
+    @property
+    def frame(self) -> int:
+        """Frames since the start."""
+        return self.loop.frame
 
     @property
     def time(self) -> float:
         """Simulated time since the start [s]."""
-        return self._sim.frame * self._sim.settings.dt
+        return self.loop.time
 
     def get(self, name: str) -> np.ndarray:
         """A per-particle array, copied to the host."""
-        return self._sim.state[name].numpy().copy()
+        return self.loop.get(name)
 
     def world(self, index: int) -> World:
         """A view of one world."""
-        return World(self._sim, index)
+        return World(self.loop, self.writer, index)
+
+    def force(self, constraint: ConstraintBase) -> np.ndarray:
+        """Estimated force on the end that feels most of each tuple, |lam| |grad C| / dt^2 [force].
+
+        Args:
+            constraint: Of the scene, or one of :attr:`constraints`.
+
+        Returns:
+            (m,), of the last substep, in the order of its tuples; world by world where it stands
+            for several.
+
+        Raises:
+            ValueError: It is no part of this simulation, or no constraint on tuples.
+        """
+        return self.loop.bound("Simulation.force", constraint).read_force(constraint)
+
+    def broken(self, constraint: ConstraintBase) -> np.ndarray:
+        """Which tuples of a constraint have broken, (m,) bool, like :meth:`force`."""
+        return self.loop.bound("Simulation.broken", constraint).read_broken(constraint)
+
+    def interpolate(
+        self, fluid: SPH, points: Any, field: Any, *, world: int = 0, normalized: bool = False
+    ) -> np.ndarray:
+        """A field of a fluid anywhere: A(r) = sum_j m_j A_j / rho_j W(|r - r_j|, h).
+
+        (Monaghan 2005, sec. 2.) At the present positions. Away from the fluid it is 0; at a free
+        surface it falls to 0 over 2 h, like the sum of the weights.
+
+        Args:
+            fluid: An ``SPH`` of the scene, or of :attr:`interactions`.
+            points: Where, (k, 3) [length].
+            field: ``"density"``, ``"velocity"`` or another array of the state or attribute of the
+                particles by name; or values, (n,) or (n, 3), of the fluid's particles in order or
+                of all particles of the world.
+            world: Whose fluid.
+            normalized: Divide by sum_j m_j / rho_j W (Shepard 1968), which makes constants exact
+                up to the surface.
+
+        Returns:
+            (k,) or (k, 3), float64.
+
+        Raises:
+            ValueError: Points or values of wrong shape or not finite, a world, a fluid or a name
+                that is not there.
+        """
+        bound = self.loop.bound("Simulation.interpolate", fluid)
+        return interpolate(bound, points, field, world, normalized)
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write a checkpoint: all that is needed to go on from here, bit for bit.
@@ -68,7 +187,7 @@ class Reading(Access):
             ValueError: Another suffix. FileExistsError: It exists, and ``overwrite`` is not set.
             OSError: The folder is missing, or the file could not be written.
         """
-        checkpoint.save(self._sim, path, overwrite)
+        checkpoint.save(self.frames, self.watchdog, path, overwrite)
 
     def render(
         self,
@@ -101,21 +220,21 @@ class Reading(Access):
         """
         from ..pictures.render.preview import render
 
-        return render(self._sim, path, width, height, camera, color, **options)
+        return render(self, path, width, height, camera, color, **options)
 
     def _repr_png_(self) -> bytes | None:
         """A picture for notebooks, where Pillow is installed."""
         from ..pictures.render.preview import notebook_picture
 
-        return notebook_picture(self._sim)
+        return notebook_picture(self)
 
     def stability(self) -> Stability:
         """The largest safe substep of every part at the present moment, and what binds."""
-        return stability(self._sim)
+        return stability(self.loop)
 
     def diagnostics(self) -> Diagnostics:
         """Conserved quantities of every world at the present time."""
-        return measure(self._sim)
+        return measure(self.loop)
 
     def ledger(self) -> Ledger:
         """Work and impulse of every interaction and constraint since the start, world by world.
@@ -123,8 +242,8 @@ class Reading(Access):
         Raises:
             ValueError: ``settings.ledger`` is not set.
         """
-        return read(self._sim)
+        return read(self.accounts)
 
     def explain(self) -> Explanation:
         """What is allocated, compiled and launched, and why."""
-        return explain(self._sim)
+        return explain(self.frames)

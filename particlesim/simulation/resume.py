@@ -14,14 +14,12 @@ import time
 import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .. import validate
 from ..output import checkpoint
 from ..scene.fingerprint import difference, fingerprint, first_change, values
-
-if TYPE_CHECKING:
-    from .simulation import Simulation
+from .reading import Reading
 
 OWNER = "Simulation.run"
 INTERVAL = 10.0  # least time between two checkpoints, where no number of frames is given [s]
@@ -46,7 +44,7 @@ class Checkpoints:
         options: Of the recorder; a resumed run must have the same.
     """
 
-    def __init__(self, sim: Simulation, output: Path, every: int | None, options: Mapping):
+    def __init__(self, sim: Reading, output: Path, every: int | None, options: Mapping):
         self.sim, self.output, self.every = sim, output, every
         self.path = checkpoint_path(output)
         self.first = sim.frame
@@ -94,7 +92,7 @@ class Checkpoints:
             )  # fmt: skip
         self._compare(saved.header)
         if saved.arrays:
-            checkpoint.restore(self.sim, saved, self.path)
+            checkpoint.restore(self.sim.frames, self.sim.watchdog, saved, self.path)
             self._captured = self.sim.frame
         return saved.header["run"]["recorded"]
 
@@ -154,12 +152,12 @@ class Checkpoints:
         return self._captured == self.sim.frame
 
     def _capture(self, recorded: int | None, state: bool) -> checkpoint.Capture:
-        made = checkpoint.capture(self.sim, self._scenes, state)
+        made = checkpoint.capture(self.sim.frames, self.sim.watchdog, self._scenes, state)
         made.header["run"] = {"recorded": recorded, "arguments": self._arguments}
         return made
 
 
-def _checksum(sim: Simulation) -> str:
+def _checksum(sim: Reading) -> str:
     """Of the state that a run starts from."""
     digest = 0
     for name in ("position", "velocity"):

@@ -1,27 +1,26 @@
-"""Running many frames: recording and progress around ``Simulation.step``."""
+"""Running many frames: recording and progress around every step."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 from .. import validate
-from ..instruments.errors import SimulationError
+from ..instruments.watchdog.incident import SimulationError
 from ..output.history.writer import History, check_output
 from ..output.progress import Meter
 from ..output.recorders import open_recorder
 from ..output.recorders.background import BackgroundWriter
 from ..output.recorders.base import Recorder
+from .reading import Reading
 from .resume import OWNER, Checkpoints
-
-if TYPE_CHECKING:
-    from .simulation import Simulation
 
 
 def run(
-    sim: Simulation,
+    sim: Reading,
+    step: Callable[[], None],
     frames: int,
     *,
     record: Any,
@@ -31,7 +30,7 @@ def run(
     resume: bool,
     **options: Any,
 ) -> None:
-    """Advance ``sim`` by ``frames`` frames (see :meth:`Simulation.run`)."""
+    """Advance by ``frames`` frames (see :meth:`Simulation.run`)."""
     first = sim.frame
     if history is not None:
         check_output("History", Path(history), overwrite or resume)
@@ -52,7 +51,7 @@ def run(
         if progress is True:
             progress = stack.enter_context(Meter().measure("run", sim, frames))
         while sim.frame < first + frames:
-            sim.step()
+            step()
             if recording is not None:
                 recording.frame()
             if measured is not None:
@@ -79,7 +78,7 @@ class Recording:
 
     def __init__(
         self,
-        sim: Simulation,
+        sim: Reading,
         frames: int,
         record: Any,
         *,

@@ -1,35 +1,26 @@
-"""Simulation: a scene, or a batch of them, on a device; and the loop, on one screen."""
+"""Simulation: a scene, or a batch of them, on a device."""
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import Any, Self
-
-import warp as wp
 
 from .. import validate
 from ..engine import batch
 from ..engine.execution.executors import Executor
-from ..engine.execution.frames import Frames, evaluate_forces
-from ..engine.execution.launch import owner
-from ..engine.integrators import METHODS
-from ..engine.model import Model
-from ..engine.neighbors.lists import Neighbors
-from ..engine.observers import FINISH, FORCE, PROJECT, Observers
-from ..engine.snapshot import Snapshot
-from ..engine.state import State
+from ..engine.frames import Frames
+from ..engine.loop import Loop
 from ..instruments.ledger.accounts import Accounts
 from ..instruments.stability.check import automatic, warn_if_past
-from ..instruments.watchdog.incident import Incident
 from ..instruments.watchdog.watch import Watchdog
 from ..interactions.fusion import fuse
 from ..output import checkpoint
 from ..scene.scene import Scene
 from ..scene.settings import Settings
-from .assign import assign_rows, reset_worlds
 from .reading import Reading
+from .writer import Writer
 
 
 class Simulation(Reading):
@@ -61,91 +52,31 @@ class Simulation(Reading):
         device: Any = None,
         worlds: int | None = None,
     ):
-        self.settings = Settings() if settings is None else settings
-        if not isinstance(self.settings, Settings):
+        settings = Settings() if settings is None else settings
+        if not isinstance(settings, Settings):
             raise TypeError(
                 f"Simulation: settings must be a Settings, got {settings!r}; use Settings(...)."
             )
-        self.scenes = batch.scenes(scene, worlds)
-        if self.settings.automatic:
-            self.settings = automatic(self.scenes, self.settings, device)
-        self.model = Model(self.scenes, self.settings, device)
-        self.device = self.model.device
-        self.frame = 0
-        self._build()
-
-    def _build(self) -> None:
-        """Prepare the parts; only what they require is allocated."""
-        model = self.model
-        self.interactions = batch.bound([scene.interactions for scene in self.scenes])
-        self.constraints = batch.bound([scene.constraints for scene in self.scenes])
-        self.state = State(model)
-        self.neighbors = Neighbors(model)
-        parts = [*self.interactions, *self.constraints]
-        for part in parts:
-            part.prepare(model, self.neighbors)
-        required = frozenset[str]().union(*(part.requires for part in parts))
-        method = METHODS[self.settings.integrator]
-        if self.constraints and method.carries_forces:
-            raise validate.fail(
-                "Settings", "integrator", "be symplectic_euler in a scene with constraints",
-                self.settings.integrator, "or leave the constraints out",
-            )  # fmt: skip
-        self.state.require({"position", "velocity"} | required)
-        remember = "previous_position" in required
-        self.integrator = method(
-            model, self.state, constrained=bool(self.constraints), remember=remember
-        )
-        self.neighbors.allocate(self.state)
-        for part in parts:
-            part.attach(model, self.state)
-        self.observers = Observers()
-        self.passes = self.interactions if self.settings.ledger else fuse(self.interactions)
-        self.accounts: Accounts | None = None
-        if self.settings.ledger:
-            self.accounts = Accounts(self)
-            self.observers.all.append(self.accounts)
-        self.snapshot = Snapshot(self)
-        self.watchdog = Watchdog(model, self.neighbors)
-        self.incidents: list[Incident] = []  # what the watchdog has found, and done about it
-        self.frames = Frames()
-        self._unknown_forces = set(range(model.world_count))
-
-    # The loop -------------------------------------------------------------------------------
+        scenes = batch.scenes(scene, worlds)
+        if settings.automatic:
+            settings = automatic(scenes, settings, device)
+        # A ledger keeps account of every part by itself.
+        self.loop = Loop(scenes, settings, device, list if settings.ledger else fuse)
+        self.accounts = None
+        if settings.ledger:
+            self.accounts = Accounts(self.loop)
+            self.loop.observers.all.append(self.accounts)
+        self.watchdog = Watchdog(self.loop.model, self.loop.neighbors)
+        self.frames = Frames(self.loop, self.watchdog)
+        self.writer = Writer(self.frames, self.watchdog, self.accounts)
 
     def substep(self, dt: float) -> None:
-        """Advance by ``dt``: interactions, integration, constraints, velocities."""
-        self.observers.begin(dt)
-        self.integrator.begin(dt)
-        self.forces(dt)
-        self.integrator.advance(dt)
-        self.constrain(dt, self.settings.iterations)
-        self.integrator.finish(dt)
-        for constraint in self.constraints:
-            with self.observers.acting(constraint, FINISH):
-                constraint.finish(self.state, self.neighbors, dt)
-        self.observers.end(dt)
+        """Advance by ``dt`` outside a frame (see :meth:`particlesim.engine.loop.Loop.substep`)."""
+        self.loop.substep(dt)
 
     def forces(self, dt: float) -> None:
         """Interactions add forces at the present positions."""
-        self.neighbors.update(self.state)
-        self.state.clear_forces()
-        for interaction in self.passes:
-            with self.observers.acting(interaction, FORCE):
-                interaction.apply(self.state, self.neighbors, dt)
-
-    def constrain(self, dt: float, iterations: int) -> None:
-        """Constraints project the positions, one after the other, in each iteration."""
-        if not self.constraints:
-            return
-        self.neighbors.update_for_constraints(self.state)
-        for constraint in self.constraints:
-            with owner(constraint.name):
-                constraint.begin(self.state, self.neighbors, dt)
-        for _ in range(iterations):
-            for constraint in self.constraints:
-                with self.observers.acting(constraint, PROJECT):
-                    constraint.project(self.state, self.neighbors, dt)
+        self.loop.forces(dt)
 
     def step(self) -> None:
         """Advance by one frame, ``settings.dt``.
@@ -156,12 +87,11 @@ class Simulation(Reading):
                 world, the time and what did it. The state is the last good frame's.
         """
         if self.particle_count and self.settings.dt > 0:
-            if self.integrator.carries_forces and self._unknown_forces:
-                evaluate_forces(self)
-            self.frames.run(self, self.settings.substeps)
+            self.loop.know_forces()
+            self.frames.run(self.settings.substeps)
             if self.watchdog.alarmed:
-                self.watchdog.attend(self)
-        self.frame += 1
+                self.watchdog.attend(self.frames)
+        self.loop.frame += 1
 
     def run(
         self,
@@ -206,9 +136,9 @@ class Simulation(Reading):
         from .run import run
 
         validate.whole("Simulation.run", "frames", frames)
-        warn_if_past(self)
+        warn_if_past(self.loop)
         run(
-            self, frames, record=record, progress=progress, history=history, overwrite=overwrite,
+            self, self.step, frames, record=record, progress=progress, history=history, overwrite=overwrite,
             checkpoint=checkpoint, resume=resume, fields=tuple(fields), **options,
         )  # fmt: skip
 
@@ -219,17 +149,13 @@ class Simulation(Reading):
             iterations: Sweeps over all constraints.
         """
         validate.whole("Simulation.project", "iterations", iterations)
-        if "previous_position" in self.state:
-            wp.copy(self.state.previous_position, self.state.position)
-        # Without a time scale compliance is nothing: alpha / dt^2 = 0.
-        self.constrain(math.inf, iterations)
-        self.neighbors.grow()
-        self.watchdog.placed(self, range(self.world_count))
+        self.loop.place_on_constraints(iterations)
+        self.watchdog.placed(self.loop, range(self.world_count))
 
     @property
     def executor(self) -> Executor:
         """What runs the frames; made on first use."""
-        return self.frames.executor(self, self.settings.substeps)
+        return self.frames.executor(self.settings.substeps)
 
     def close(self) -> None:
         """Let go of graphs and threads; the next step makes them anew."""
@@ -239,7 +165,7 @@ class Simulation(Reading):
 
     def set(self, name: str, value: Any, rows: slice = slice(None)) -> None:
         """Write a per-particle array, or rows of it; what was derived from it is forgotten."""
-        assign_rows(self, name, value, rows)
+        self.writer.set(name, value, rows)
 
     def reset(self, worlds: Iterable[int] | None = None) -> None:
         """Put worlds (None: all) back to their start, with nothing left of what they went through.
@@ -247,7 +173,7 @@ class Simulation(Reading):
         A world that is reset goes as it went the first time, also if it was frozen; the others go
         on untouched.
         """
-        reset_worlds(self, worlds)
+        self.writer.reset(worlds)
 
     @classmethod
     def load(
@@ -274,4 +200,9 @@ class Simulation(Reading):
             ValueError: Scenes or settings of another kind, and files that are damaged, newer or
                 no checkpoint. OSError: The file is missing or cannot be read.
         """
-        return checkpoint.load(cls, path, scene, settings, device, worlds)
+        source = Path(path)
+        saved = checkpoint.read(source)
+        scenes, settings = checkpoint.check(saved, source, scene, settings, worlds)
+        sim = cls(scenes, settings, device)
+        checkpoint.restore(sim.frames, sim.watchdog, saved, source)
+        return sim

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from ... import validate
-from ...instruments.errors import SimulationError
+from ...instruments.watchdog.incident import SimulationError
 from ...scene.scene import Scene
 from ...scene.settings import Settings
 from ...simulation.simulation import Simulation

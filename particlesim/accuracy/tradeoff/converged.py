@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ... import validate
-from ...instruments.errors import SimulationError
+from ...instruments.watchdog.incident import SimulationError
 from ...scene.settings import Settings
 from ...simulation.simulation import Simulation
 from .judges import Judge

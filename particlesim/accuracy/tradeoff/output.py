@@ -10,12 +10,10 @@ import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ... import validate
-
-if TYPE_CHECKING:
-    from .table import Row, Tradeoff
+from .table import Row, Tradeoff
 
 FORMATS = (".json", ".csv")
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .output import check_path, replace
-
-if TYPE_CHECKING:
-    from .table import Row, Tradeoff
+from .table import Row, Tradeoff
 
 FORMATS = (".png", ".svg", ".pdf")
 LABELS = 60  # points that still get their value written beside them

@@ -10,7 +10,7 @@ from typing import Any
 import warp as wp
 
 from ...engine.execution.executors import Executor
-from ...instruments.errors import SimulationError
+from ...instruments.watchdog.incident import SimulationError
 from ...simulation.simulation import Simulation
 from .plan import Plan
 

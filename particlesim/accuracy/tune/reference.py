@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...instruments.errors import SimulationError
+from ...instruments.watchdog.incident import SimulationError
 from ...simulation.simulation import Simulation
 from ..tradeoff.converged import ROUND_OFF, SETTLING, distance
 from ..tradeoff.plan import Plan, Study

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 import warp as wp
 
-from ...instruments.stability.report import Limit, explicit_step
+from ...engine.probing.limit import Limit, explicit_step
+from ...scene.part import Interaction
 from ..execution.launch import owner
+from ..loop import Loop
 from .spacing import spacing
 from .spectrum import Largest, largest
-
-if TYPE_CHECKING:
-    from ...interactions.base import Interaction
-    from ...simulation.simulation import Simulation
 
 STEPS = 30  # applications of a Jacobian, two evaluations of the force each
 TOLERANCE = 0.005  # of an eigenvalue: half of that in the frequency
@@ -30,13 +28,13 @@ class Probe:
     Rows of neighbours are used as they are and never made anew.
 
     Args:
-        sim: The simulation, at any moment outside a step.
+        loop: What is in motion, at any moment outside a step.
         quick: Rates that are surely within the settings' limits need not be exact.
     """
 
-    def __init__(self, sim: Simulation, quick: bool = False):
-        self.sim, self.model, self.state, self.quick = sim, sim.model, sim.state, quick
-        self.settings = sim.settings
+    def __init__(self, loop: Loop, quick: bool = False):
+        self.loop, self.model, self.state, self.quick = loop, loop.model, loop.state, quick
+        self.settings = loop.settings
         self.rates: list[tuple[Interaction, float, float]] = []  # omega^2, gamma of those asked
 
     def __enter__(self) -> Self:
@@ -82,12 +80,12 @@ class Probe:
         """By all interactions at the present state, (n, 3)."""
         if "force" not in self.state:
             return np.zeros_like(self.position)
-        return self.force(self.sim.passes) * self.inverse_mass[:, None]
+        return self.force(self.loop.passes) * self.inverse_mass[:, None]
 
     @functools.cached_property
     def spacing(self) -> float:
         """About the distance of the closest particles [length]; above 0."""
-        return spacing(self)
+        return spacing(self.model, self.position, self.velocity, self.settings.substep)
 
     def relative_speed(self, rows: np.ndarray) -> np.ndarray:
         """Speeds of these particles in the frame of their world's mean velocity."""
@@ -121,7 +119,7 @@ class Probe:
         self.state.clear_forces()
         for part in parts:
             with owner(part.name):
-                part.apply(self.state, self.sim.neighbors, self.settings.substep)
+                part.apply(self.state, self.loop.neighbors, self.settings.substep)
         return self._host("force")
 
     def response(
@@ -211,7 +209,7 @@ class Probe:
 
     def _gather(self) -> None:
         """Copy what the loops read into the order of their rows."""
-        for each in self.sim.neighbors.lists:
+        for each in self.loop.neighbors.lists:
             each.gather(self.state, each.names)
 
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from .probe import Probe
+from ..model import Model
 
 SAMPLE = 1024  # particles whose neighbours are looked for among as many others
 CLUMPED = 0.01  # of the mean spacing: closer pairs count as overlapping
 
 
-def spacing(probe: Probe) -> float:
+def spacing(model: Model, x: np.ndarray, v: np.ndarray, dt: float) -> float:
     """About the distance of the closest particles of a world [length], above 0.
 
     Looks along each axis at the next few in order, so it may miss the very closest, not the scale.
@@ -21,22 +18,21 @@ def spacing(probe: Probe) -> float:
     """
     closest = [
         each
-        for w in range(probe.model.world_count)
-        if (each := _of_world(probe, slice(*probe.model.offsets[w : w + 2]))) is not None
+        for w in range(model.world_count)
+        if (each := _of_world(x[slice(*model.offsets[w : w + 2])])) is not None
     ]
     if closest:
         return min(closest)
-    fastest = float(np.abs(probe.velocity).max(initial=0.0))
+    fastest = float(np.abs(v).max(initial=0.0))
     candidates = (
-        float(probe.model.column("radius").max(initial=0.0)),
-        float(np.abs(probe.position).max(initial=0.0)),
-        fastest * probe.settings.substep,
+        float(model.column("radius").max(initial=0.0)),
+        float(np.abs(x).max(initial=0.0)),
+        fastest * dt,
     )
     return next((each for each in candidates if each > 0), 1.0)
 
 
-def _of_world(probe: Probe, rows: slice) -> float | None:
-    x = probe.position[rows]
+def _of_world(x: np.ndarray) -> float | None:
     if len(x) < 2:
         return None
     extent = np.ptp(x, axis=0)

@@ -25,21 +25,19 @@ All sums are float64, in blocks of fixed bounds; a particle's share is of the st
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ...engine.execution.launch import launch, owner
+from ...engine.loop import Loop
+from ...engine.model import Model
 from ...engine.observers import FORCE, PROJECT, Observer
+from ...engine.state import State
 from ...kernels.engine.copy import copy_kernel, zero_kernel
 from ...kernels.instruments.ledger import TOTALS, account_kernel, change_kernel
 from ..diagnostics import blocks
-
-if TYPE_CHECKING:
-    from ...engine.model import Model
-    from ...engine.state import State
-    from ...simulation.simulation import Simulation
 
 BLOCK_CPU, BLOCK_CUDA = 256, 16  # particles that a thread sums
 
@@ -53,19 +51,21 @@ class Account:
 
 
 class Accounts(Observer):
-    """The accounts of all parts of a simulation."""
+    """The accounts of all parts of a loop."""
 
-    def __init__(self, sim: Simulation):
-        model, state = sim.model, sim.state
+    name = "ledger"
+
+    def __init__(self, loop: Loop):
+        model, state = loop.model, loop.state
         state.require({"mass", "inverse_mass"})
         self.model, self.state = model, state
-        self.halves = sim.integrator.carries_forces  # kicks at both ends of a substep
+        self.halves = loop.integrator.carries_forces  # kicks at both ends of a substep
         size = BLOCK_CPU if model.device.is_cpu else BLOCK_CUDA
         begin, end, self.world = blocks(model.offsets, size)
         self._blocks = [model.array(each, wp.int32) for each in (begin, end)]
         self.x0, self.v0, self.seen = (self._rows() for _ in range(3))
-        self.accounts = [self._open(part, True) for part in sim.interactions]
-        self.accounts += [self._open(part, False) for part in sim.constraints]
+        self.accounts = [self._open(part, True) for part in loop.interactions]
+        self.accounts += [self._open(part, False) for part in loop.constraints]
         self.start = wp.zeros(model.world_count, dtype=TOTALS, device=model.device)
         self.begin_anew(range(model.world_count))
 
@@ -135,7 +135,6 @@ class Accounts(Observer):
     # What outlives a substep ------------------------------------------------------------------
 
     def persistent(self) -> dict[str, wp.array]:
-        """Arrays for snapshots and checkpoints."""
         found = {"start": self.start}
         for k, each in enumerate(self.accounts):
             found[f"totals_{k}"] = each.totals
@@ -143,19 +142,16 @@ class Accounts(Observer):
                 found[f"late_{k}"] = each.late
         return found
 
-    def worlds(self, name: str) -> np.ndarray:
-        """The world of each row of one of these arrays."""
+    def worlds(self, name: str, array: wp.array) -> np.ndarray:
         if name == "start":
             return np.arange(self.model.world_count)
         return self.world if name.startswith("totals") else self.model.world_of
 
-    def forces(self) -> list[wp.array]:
-        """What the next kick takes from the last evaluation."""
+    def carried(self) -> list[wp.array]:
         return [each.late for each in self.accounts if each.acts and self.halves]
 
     @property
     def memory(self) -> int:
-        """Bytes of all arrays."""
         own = [self.x0, self.v0, self.seen, self.start]
         for each in self.accounts:
             own += [each.early, each.totals] + ([each.late] if each.late is not each.early else [])

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ... import validate
-
-if TYPE_CHECKING:
-    from ...simulation.simulation import Simulation
+from .accounts import Accounts
 
 
 @dataclass(frozen=True)
@@ -96,9 +93,8 @@ def _line(name: str, work: float, impulse: np.ndarray, width: int) -> str:
     return f"{name:<{width}}  {work:12.5g}  " + " ".join(f"{each:12.5g}" for each in impulse)
 
 
-def read(sim: Simulation) -> Ledger:
-    """The ledger of a simulation (see :meth:`Simulation.ledger`)."""
-    accounts = sim.accounts
+def read(accounts: Accounts | None) -> Ledger:
+    """The ledger that accounts make (see :meth:`Simulation.ledger`)."""
     if accounts is None:
         raise validate.fail(
             "Simulation.ledger", "settings.ledger", "be True from the start", False,

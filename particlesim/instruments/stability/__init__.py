@@ -1,8 +1,9 @@
 """Limits before a run: the largest safe substep of every part of a simulation."""
 
+from ...engine.probing.limit import Limit
 from ...engine.probing.probe import Probe
 from .check import StabilityWarning, automatic, stability, warn_if_past
-from .report import Limit, Stability
+from .report import Stability
 
 __all__ = [
     "Limit",

@@ -6,41 +6,40 @@ import math
 import warnings
 import weakref
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ... import validate
+from ...engine.loop import Loop
+from ...engine.probing.limit import Limit, explicit_step
 from ...engine.probing.probe import Probe
-from ...scene.settings import AUTO
-from .report import Limit, Stability, explicit_step
+from ...interactions.fusion import fuse
+from ...scene.scene import Scene
+from ...scene.settings import AUTO, Settings
+from .report import Stability
 from .start import misfit
-
-if TYPE_CHECKING:
-    from ...scene.scene import Scene
-    from ...scene.settings import Settings
-    from ...simulation.simulation import Simulation
 
 PROVISIONAL = 1.0 / 60.0  # a frame's time while it is yet to be found
 NEGLIGIBLE = 0.97  # of the tightest limit: what several parts do together matters below it
 
-_checked: weakref.WeakSet[Simulation] = weakref.WeakSet()
+_checked: weakref.WeakSet[Loop] = weakref.WeakSet()
 
 
 class StabilityWarning(UserWarning):
     """Settings are past the limit of a scene."""
 
 
-def stability(sim: Simulation, quick: bool = False) -> Stability:
+def stability(loop: Loop, quick: bool = False) -> Stability:
     """The limits of all parts at the present moment (see ``Simulation.stability``).
 
     ``quick``: limits that the settings surely keep may be smaller than they are.
     """
     limits: list[Limit] = []
-    if sim.particle_count:
-        with Probe(sim, quick) as probe:
-            for part in [*sim.interactions, *sim.constraints]:
+    if loop.model.particle_count:
+        with Probe(loop, quick) as probe:
+            for part in [*loop.interactions, *loop.constraints]:
                 limits += part.limits(probe)
             limits += _together(probe, limits)
-    return Stability(sorted(limits, key=lambda limit: limit.dt), sim.settings)
+    return Stability(sorted(limits, key=lambda limit: limit.dt), loop.settings)
 
 
 def _together(probe: Probe, limits: list[Limit]) -> list[Limit]:
@@ -60,16 +59,16 @@ def _together(probe: Probe, limits: list[Limit]) -> list[Limit]:
     return probe.together(parts)
 
 
-def warn_if_past(sim: Simulation) -> None:
+def warn_if_past(loop: Loop) -> None:
     """Warn, once a simulation, if its settings are past the limit, or its start does not fit."""
-    if sim in _checked or not sim.settings.dt > 0:
+    if loop in _checked or not loop.settings.dt > 0:
         return
-    _checked.add(sim)
-    if said := misfit(sim):
+    _checked.add(loop)
+    if said := misfit(loop):
         warnings.warn(said, StabilityWarning, stacklevel=3)
-    if stability(sim, quick=True).safe:
+    if stability(loop, quick=True).safe:
         return
-    report = stability(sim)
+    report = stability(loop)
     if report.safe or report.binding is None:
         return
     limit = report.binding
@@ -79,7 +78,7 @@ def warn_if_past(sim: Simulation) -> None:
     warnings.warn(
         f"Simulation: substep must be at most {limit.dt:.3g} s for {limit.part} ({limit.kind}: "
         f"{limit.reason}{', ' * bool(limit.where)}{limit.where}), got "
-        f"{sim.settings.substep:.3g} s; {remedy}.",
+        f"{loop.settings.substep:.3g} s; {remedy}.",
         StabilityWarning,
         stacklevel=3,
     )
@@ -91,12 +90,10 @@ def automatic(scenes: Sequence[Scene], settings: Settings, device: Any) -> Setti
     Raises:
         ValueError: Nothing limits the substep, or nothing is small enough.
     """
-    from ...simulation.simulation import Simulation
-
     of_frame = settings.dt == AUTO
     name = "dt" if of_frame else "substeps"
     trial = settings.replace(dt=PROVISIONAL) if of_frame else settings.replace(substeps=1)
-    limit = settings.safety * stability(Simulation(scenes, trial, device)).dt
+    limit = settings.safety * stability(Loop(scenes, trial, device, fuse)).dt
     if not 0.0 < limit < math.inf:
         what = "no part limits it" if limit else "the forces are not finite at the start"
         raise validate.fail(

@@ -10,29 +10,27 @@ that no finer path meets (the speed is then in proportion to the substep).
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from ...simulation.simulation import Simulation
+from ...engine.frames import Frames
 
 REFINEMENTS = (1, 2, 4)
 AGREE = np.sqrt(2.0)  # ratio of speeds, that is a factor of two in energy
 
 
-def causes(sim: Simulation, worlds: Iterable[int], substeps: int) -> dict[int, float]:
+def causes(frames: Frames, worlds: Iterable[int], substeps: int) -> dict[int, float]:
     """The largest speed of each of these worlds that has a cause; others are left out.
 
     Starts from the last good frame, and leaves the state of its end after ``substeps``.
     """
     peaks = []
     for refinement in REFINEMENTS:
-        sim.snapshot.restore()
-        peak = sim.frames.peaks(sim, refinement * substeps)
-        peaks.append([_largest(peak, sim.world(w).rows) for w in worlds])
-    sim.snapshot.restore()
-    sim.frames.run(sim, substeps)
+        frames.snapshot.restore()
+        peak = frames.peaks(refinement * substeps)
+        peaks.append([_largest(peak, frames.loop.model.rows(w)) for w in worlds])
+    frames.snapshot.restore()
+    frames.run(substeps)
     return {
         w: float(max(speeds))
         for w, speeds in zip(worlds, np.transpose(peaks), strict=True)

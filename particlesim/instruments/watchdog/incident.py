@@ -21,6 +21,14 @@ DONE = {
 }
 
 
+class SimulationError(RuntimeError):
+    """A simulation that cannot go on, with the particle, world, time and cause in the message."""
+
+
+class SimulationWarning(UserWarning):
+    """A world went wrong and the simulation goes on: what ``sim.incidents`` has, as it happens."""
+
+
 @dataclass(frozen=True)
 class Incident:
     """What was wrong, with which particle, when, by what, and what became of it.

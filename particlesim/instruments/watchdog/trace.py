@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ...engine.frames import Frames
+from ...engine.loop import Loop
 from ...engine.observers import FORCE, Observer
-from .limits import FAST, FINITE
-
-if TYPE_CHECKING:
-    from ...simulation.simulation import Simulation
-
+from .limits import FAST, FINITE, Limits
 
 SHARE = 0.1  # of its velocity that a part must have added within the substep to have done it
 
@@ -30,19 +28,22 @@ class Culprit:
     part: str | None = None
 
 
-def survey(sim: Simulation, substep: int, kinds: dict[int, int] | None = None) -> list[Culprit]:
+def survey(
+    loop: Loop, limits: Limits, substep: int, kinds: dict[int, int] | None = None
+) -> list[Culprit]:
     """The worlds that are wrong at present, each with its first, or fastest, wrong particle.
 
     Args:
-        sim: The simulation.
+        loop: What is in motion.
+        limits: What it is to keep.
         substep: Which one has just ended.
         kinds: Look only at these worlds, and only for this; None: at all, for anything.
     """
-    x, v, model = sim.position, sim.velocity, sim.model
-    wrong = sim.watchdog.limits.wrong(x, v, model.world_of)
+    x, v, model = loop.get("position"), loop.get("velocity"), loop.model
+    wrong = limits.wrong(x, v, model.world_of)
     found = []
     for w in np.unique(model.world_of[wrong > 0]).tolist() if kinds is None else kinds:
-        begin, end = int(model.offsets[w]), int(model.offsets[w + 1])
+        begin, end = model.rows(w).start, model.rows(w).stop
         mine = wrong[begin:end]
         kind = int(mine[mine > 0].min(initial=FAST)) if kinds is None else kinds[w]
         hits = mine == kind
@@ -54,36 +55,38 @@ def survey(sim: Simulation, substep: int, kinds: dict[int, int] | None = None) -
     return found
 
 
-def trace(sim: Simulation, culprits: list[Culprit], substeps: int) -> list[Culprit]:
+def trace(frames: Frames, limits: Limits, culprits: list[Culprit], substeps: int) -> list[Culprit]:
     """Who first did what is wrong at the end of a frame; leaves the state of its start.
 
     Args:
-        sim: The simulation.
+        frames: Of which one has failed.
+        limits: What it was to keep.
         culprits: As surveyed at the end of the frame.
         substeps: Of the frame that failed.
     """
-    dt = sim.settings.dt / substeps
+    loop, snapshot = frames.loop, frames.snapshot
+    dt = loop.settings.dt / substeps
     found = {each.world: each for each in culprits}
     pending = {each.world: each.kind for each in culprits}
-    sim.snapshot.restore()
+    snapshot.restore()
     for k in range(substeps):
-        sim.substep(dt)
-        for each in survey(sim, k, pending):
+        loop.substep(dt)
+        for each in survey(loop, limits, k, pending):
             found[each.world] = each
             del pending[each.world]
         if not pending:
             break
-    sim.snapshot.restore()
+    snapshot.restore()
     for k in range(1 + max(each.substep for each in found.values())):
         now = [each for each in found.values() if each.substep == k]
         if not now:
-            sim.substep(dt)
+            loop.substep(dt)
             continue
-        fused, sim.passes = sim.passes, sim.interactions  # one by one
-        with sim.observers.watching(_Look(sim, now, dt)):
-            sim.substep(dt)
-        sim.passes = fused
-    sim.snapshot.restore()
+        fused, loop.passes = loop.passes, loop.interactions  # one by one
+        with loop.observers.watching(_Look(loop, now, dt)):
+            loop.substep(dt)
+        loop.passes = fused
+    snapshot.restore()
     return [found[w] for w in sorted(found)]
 
 
@@ -94,8 +97,8 @@ class _Look(Observer):
     being infinite itself is laid to the part that adds most to its velocity.
     """
 
-    def __init__(self, sim: Simulation, pending: list[Culprit], dt: float):
-        self.sim, self.dt, self.pending = sim, dt, pending
+    def __init__(self, loop: Loop, pending: list[Culprit], dt: float):
+        self.loop, self.dt, self.pending = loop, dt, pending
         self.open = {each.world: each for each in pending if each.kind == FINITE}
         self.pushes: list[dict[str, np.ndarray]] = [{} for _ in pending]
 
@@ -119,7 +122,7 @@ class _Look(Observer):
 
     def _push(self, row: int) -> np.ndarray:
         """The velocity of a particle with what its present force and correction will add."""
-        state, dt = self.sim.state, self.dt
+        state, dt = self.loop.state, self.dt
         u = state.velocity[row : row + 1].numpy()[0].astype(np.float64)
         if "force" in state:
             w = float(state.inverse_mass[row : row + 1].numpy()[0])
@@ -132,9 +135,9 @@ class _Look(Observer):
         """Note the worlds in which something is no longer finite, and that ``part`` did it."""
         if not self.open:
             return
-        arrays = [self.sim.get(name) for name in names]
+        arrays = [self.loop.get(name) for name in names]
         for w, culprit in list(self.open.items()):
-            rows = self.sim.world(w).rows
+            rows = self.loop.model.rows(w)
             if not all(np.isfinite(each[rows]).all() for each in arrays):
                 del self.open[w]
                 culprit.part = part

@@ -9,25 +9,23 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ...engine.execution.launch import launch, owner
-from ...engine.world_rows import arrays_by_world, put, take
+from ...engine.frames import Frames
+from ...engine.loop import Loop
+from ...engine.model import Model
+from ...engine.neighbors.lists import Neighbors
+from ...engine.state import State
 from ...kernels.instruments.watchdog import check_kernel, hold_kernel
 from ..diagnostics import blocks
-from ..errors import SimulationError, SimulationWarning
 from .audit import causes
-from .incident import Incident
+from .incident import Incident, SimulationError, SimulationWarning
 from .limits import ESCAPED, FAST, FINITE, Limits
 from .trace import Culprit, survey, trace
-
-if TYPE_CHECKING:
-    from ...engine.model import Model
-    from ...engine.neighbors.lists import Neighbors
-    from ...simulation.simulation import Simulation
 
 KINDS = {FINITE: "not finite", ESCAPED: "escaped", FAST: "runaway"}
 BLOCK_CPU, BLOCK_CUDA = 256, 8  # particles that a thread looks at
@@ -50,12 +48,13 @@ class Watchdog:
         edges = blocks(model.offsets, size)
         self._blocks = [model.array(each, wp.int32) for each in edges]
         self.frozen: set[int] = set()
+        self.incidents: list[Incident] = []  # what was found, and done about it
         self._mark = wp.zeros(model.world_count, dtype=wp.int32, device=model.device)
         self._held: list[tuple[wp.array, wp.array, wp.array]] = []  # worlds of rows, copy, array
 
     # On the device ----------------------------------------------------------------------------
 
-    def look(self, sim: Simulation) -> None:
+    def look(self, state: State) -> None:
         """At the end of a frame: put frozen worlds back, and look at all particles. Launches."""
         with owner("watchdog"):
             for world, copy, array in self._held:
@@ -65,8 +64,8 @@ class Watchdog:
                 launch(
                     check_kernel(self.model.precision, self.model.vectorised),
                     len(self._blocks[0]),
-                    [*self._blocks, *self.limits.arrays.values(), sim.state.position,
-                     sim.state.velocity, self.flag],
+                    [*self._blocks, *self.limits.arrays.values(), state.position,
+                     state.velocity, self.flag],
                     self.model.device,
                 )  # fmt: skip
 
@@ -76,42 +75,46 @@ class Watchdog:
         seen = self.flag.numpy() if self._seen is None else self._seen
         return bool(seen[0])
 
+    def forget(self) -> None:
+        """What was seen is void: the frame is done again."""
+        self.flag.zero_()
+
     # On the host ------------------------------------------------------------------------------
 
-    def attend(self, sim: Simulation) -> None:
+    def attend(self, frames: Frames) -> None:
         """The flag is up: find out why, and act.
 
         Raises:
             SimulationError: ``on_failure`` is ``"stop"``, or no retry has helped.
         """
         substeps = self.settings.substeps
-        culprits = self._wrong(sim, substeps)
+        culprits = self._wrong(frames, substeps)
         if culprits:
-            culprits = trace(sim, culprits, substeps)
+            culprits = trace(frames, self.limits, culprits, substeps)
             {"stop": self._stop, "retry": self._retry, "freeze": self._freeze}[
                 self.settings.on_failure
-            ](sim, culprits)
+            ](frames, culprits)
         self.flag.zero_()
 
-    def _wrong(self, sim: Simulation, substeps: int) -> list[Culprit]:
+    def _wrong(self, frames: Frames, substeps: int) -> list[Culprit]:
         """Worlds that are wrong at the end of a frame of so many substeps, without a cause."""
         self.flag.zero_()
-        culprits = survey(sim, substeps - 1)
+        culprits = survey(frames.loop, self.limits, substeps - 1)
         fast = [each.world for each in culprits if each.kind == FAST]
         if fast:
-            allowed = causes(sim, fast, substeps)
+            allowed = causes(frames, fast, substeps)
             self.limits.allow(allowed)
             self.flag.zero_()
             culprits = [each for each in culprits if each.world not in allowed]
         return culprits
 
-    def _incident(self, sim: Simulation, culprit: Culprit, action: str, substeps: int) -> Incident:
-        row, kind, start = culprit.row, culprit.kind, sim.time
+    def _incident(self, loop: Loop, culprit: Culprit, action: str, substeps: int) -> Incident:
+        row, kind, start = culprit.row, culprit.kind, loop.time
         return Incident(
             kind=KINDS[kind],
             world=culprit.world,
             particle=row - int(self.model.offsets[culprit.world]),
-            frame=sim.frame,
+            frame=loop.frame,
             start=start,
             stop=start + self.settings.dt,
             substep=culprit.substep + 1,
@@ -131,15 +134,15 @@ class Watchdog:
             return f"{lower} to {upper}"
         return f"{host['speed'][w]:g}" if culprit.kind == FAST else ""
 
-    def _stop(self, sim: Simulation, culprits: list[Culprit], substeps: int | None = None) -> None:
+    def _stop(self, frames: Frames, culprits: list[Culprit], substeps: int | None = None) -> None:
         """Raise, from the last good frame; ``substeps``: which did not help either."""
-        sim.snapshot.restore()
+        frames.snapshot.restore()
         self.flag.zero_()
         incidents = [
-            self._incident(sim, each, "stop", substeps or self.settings.substeps)
+            self._incident(frames.loop, each, "stop", substeps or self.settings.substeps)
             for each in culprits
         ]
-        sim.incidents += incidents
+        self.incidents += incidents
         text = incidents[0].found
         if substeps:
             text += f"; even {substeps} substeps do not help"
@@ -148,58 +151,58 @@ class Watchdog:
             text += f"; and worlds {', '.join(worlds[:4])}{', ...' if len(worlds) > 4 else ''} too"
         raise SimulationError(f"{text}.")
 
-    def _report(self, sim: Simulation, culprits: list[Culprit], action: str, substeps: int) -> None:
+    def _report(self, loop: Loop, culprits: list[Culprit], action: str, substeps: int) -> None:
         for culprit in culprits:
-            incident = self._incident(sim, culprit, action, substeps)
-            sim.incidents.append(incident)
+            incident = self._incident(loop, culprit, action, substeps)
+            self.incidents.append(incident)
             warnings.warn(str(incident), SimulationWarning, stacklevel=5)
 
-    def _retry(self, sim: Simulation, culprits: list[Culprit]) -> None:
+    def _retry(self, frames: Frames, culprits: list[Culprit]) -> None:
         """Do the frame again with more substeps, in the worlds that need it."""
         worlds, substeps = [each.world for each in culprits], self.settings.substeps
         for _ in range(self.settings.retries):
             substeps *= 2
-            sim.snapshot.restore()
-            sim.frames.run(sim, substeps)
-            still = {each.world for each in self._wrong(sim, substeps)}
+            frames.snapshot.restore()
+            frames.run(substeps)
+            still = {each.world for each in self._wrong(frames, substeps)}
             if not still & set(worlds):
                 break
         else:
-            self._stop(sim, culprits, substeps)
+            self._stop(frames, culprits, substeps)
         if len(worlds) < self.model.world_count:
             # The others go on from what they had; the multipliers kept are per their own substep.
-            better = take(sim, worlds)
-            sim.snapshot.restore()
-            sim.frames.run(sim, self.settings.substeps)
-            put(sim, better, {"_lam": (substeps / self.settings.substeps) ** 2})
-        self._report(sim, culprits, "retry", substeps)
+            better = frames.snapshot.rows(worlds)
+            frames.snapshot.restore()
+            frames.run(self.settings.substeps)
+            frames.snapshot.put(better, {"_lam": (substeps / self.settings.substeps) ** 2})
+        self._report(frames.loop, culprits, "retry", substeps)
 
-    def _freeze(self, sim: Simulation, culprits: list[Culprit]) -> None:
+    def _freeze(self, frames: Frames, culprits: list[Culprit]) -> None:
         """Hold these worlds at the last good frame from now on, and let the others have theirs."""
         worlds = [each.world for each in culprits]
-        sim.snapshot.restore()
-        shown = self._shown_at_start(sim)
+        frames.snapshot.restore()
+        shown = self._shown_at_start(frames.loop)
         self.frozen |= set(worlds)
-        self._hold(sim, worlds, shown)
-        sim.close()  # what is recorded does not hold them yet
-        sim.snapshot.restore()
-        sim.frames.run(sim, self.settings.substeps)
-        self._report(sim, culprits, "freeze", self.settings.substeps)
+        self._hold(frames, worlds, shown)
+        frames.close()  # what is recorded does not hold them yet
+        frames.snapshot.restore()
+        frames.run(self.settings.substeps)
+        self._report(frames.loop, culprits, "freeze", self.settings.substeps)
 
-    def _shown_at_start(self, sim: Simulation) -> dict[str, np.ndarray]:
+    def _shown_at_start(self, loop: Loop) -> dict[str, np.ndarray]:
         """Arrays that go with the forces, at the last good frame."""
-        names = [name for name in SHOWN if name in sim.state]
-        if names:
-            sim.forces(self.settings.substep)
-        return {name: sim.get(name) for name in names}
+        if any(name in loop.state for name in SHOWN):
+            loop.forces(self.settings.substep)
+        return self._shown(loop)
 
-    def _hold(self, sim: Simulation, worlds: Iterable[int], shown: dict[str, Any]) -> None:
+    def _hold(self, frames: Frames, worlds: Iterable[int], shown: dict[str, Any]) -> None:
         """Gather what is to be put back every frame; ``shown`` is so in ``worlds``."""
         self._mark.assign(np.isin(np.arange(self.model.world_count), list(self.frozen)).astype(int))
         before = {id(array): copy for _, copy, array in self._held}
-        copies = {id(array): sim.snapshot.copies[n] for n, array in sim.snapshot.arrays.items()}
+        snapshot = frames.snapshot
+        copies = {id(array): snapshot.copies[n] for n, array in snapshot.arrays.items()}
         self._held = []
-        for name, (array, world) in arrays_by_world(sim).items():
+        for name, (array, world) in snapshot.by_world().items():
             copy = copies.get(id(array))
             if copy is None and name.removeprefix("state/") in shown:
                 copy = before.get(id(array), wp.clone(array))
@@ -211,33 +214,32 @@ class Watchdog:
 
     # What others do ---------------------------------------------------------------------------
 
-    def placed(self, sim: Simulation, worlds: Iterable[int]) -> None:
+    def placed(self, loop: Loop, worlds: Iterable[int]) -> None:
         """Positions or velocities in these worlds were written from outside."""
-        self.limits.follow(sim.position, sim.velocity, worlds)
+        self.limits.follow(loop.get("position"), loop.get("velocity"), worlds)
 
-    def reset(self, sim: Simulation, worlds: Iterable[int]) -> None:
+    def reset(self, frames: Frames, worlds: Iterable[int]) -> None:
         """These worlds are at their start again, and free."""
         self.limits.reset(worlds)
         self.flag.zero_()
         if self.frozen & set(worlds):
-            self._thaw(sim, self.frozen - set(worlds))
+            self.frozen -= set(worlds)
+            frames.close()
+            if self.frozen:
+                self._hold(frames, (), self._shown(frames.loop))
+            else:
+                self._held = []
 
-    def _thaw(self, sim: Simulation, left: set[int]) -> None:
-        self.frozen = left
-        sim.close()
-        if left:
-            self._hold(sim, (), {name: sim.get(name) for name in SHOWN if name in sim.state})
-        else:
-            self._held = []
-
-    def resume(self, sim: Simulation, frozen: Iterable[int]) -> None:
+    def resume(self, frames: Frames, frozen: Iterable[int]) -> None:
         """Go on from a checkpoint, in which these worlds are frozen."""
-        self.placed(sim, range(self.model.world_count))
+        self.placed(frames.loop, range(self.model.world_count))
         self.frozen = set(frozen)
         if self.frozen:
-            shown = {name: sim.get(name) for name in SHOWN if name in sim.state}
-            self._hold(sim, self.frozen, shown)
-            sim.close()
+            self._hold(frames, self.frozen, self._shown(frames.loop))
+            frames.close()
+
+    def _shown(self, loop: Loop) -> dict[str, np.ndarray]:
+        return {name: loop.get(name) for name in SHOWN if name in loop.state}
 
 
 def _triple(values: np.ndarray) -> tuple[float, float, float]:

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ... import validate
 from ...engine.execution.launch import launch
+from ...engine.model import Model
 from ...kernels.interactions import sph as kernels
-
-if TYPE_CHECKING:
-    from ...engine.model import Model
-    from .sph import SPH
+from .sph import SPH
 
 
 def interpolate(sph: SPH, points: Any, field: Any, world: int, normalized: bool) -> np.ndarray:
-    """See ``SPH.interpolate``; ``sph`` is part of a simulation."""
-    owner, model = f"{sph.name}.interpolate", sph.model
+    """See ``Simulation.interpolate``; ``sph`` is bound."""
+    owner, model = "Simulation.interpolate", sph.model
     where = validate.rows(owner, "points", points, None, 3)
     if validate.whole(owner, "world", world) >= model.world_count:
         raise validate.fail(

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
-from ...instruments.stability.report import Limit, explicit_step
+from ...engine.probing.limit import Limit, explicit_step
+from ...engine.probing.probe import Probe
 from .smoothing import SUPPORT, Smoothing
 from .viscosities import ArtificialViscosity
-
-if TYPE_CHECKING:
-    from ...engine.probing.probe import Probe
-    from .sph import SPH
 
 ACCELERATION = 0.25
 ADVISED = 0.4  # of h / c, for accuracy (Monaghan 1992)
@@ -21,7 +18,7 @@ POINTS = 400  # of quadratures over the support
 WAVENUMBERS = np.linspace(0.02, 8.0, 400)  # kappa = k h; k W_hat is largest near 1.8
 
 
-def fluid_limits(part: SPH, probe: Probe) -> list[Limit]:
+def fluid_limits(part: Any, probe: Probe) -> list[Limit]:
     """The tightest of both kinds over the fluid, at present densities, speeds and accelerations.
 
     - sound: that of an oscillation omega = c max(k W_hat(k)) damped by gamma, where W_hat is the
@@ -55,7 +52,7 @@ def fluid_limits(part: SPH, probe: Probe) -> list[Limit]:
 
 
 def _damping_rates(
-    part: SPH, probe: Probe, each: dict[str, np.ndarray], c: np.ndarray
+    part: Any, probe: Probe, each: dict[str, np.ndarray], c: np.ndarray
 ) -> np.ndarray:
     """gamma of every member."""
     if part.viscosity is None:

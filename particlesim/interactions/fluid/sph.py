@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ... import validate
 from ...engine.execution.launch import launch
+from ...engine.model import Model
 from ...engine.neighbors.lists import Neighbors
 from ...engine.neighbors.verlet import VerletList
+from ...engine.probing.limit import Limit
+from ...engine.probing.probe import Probe
+from ...engine.state import State
+from ...engine.structs import filled, structure_of
 from ...kernels.interactions import sph as kernels
 from ...kernels.interactions.pair import pair_kernel
-from ..base import Interaction
-from ..pair import filled, structure_of
+from ...scene.part import Interaction
 from .equations_of_state import EquationOfState
-from .interpolation import interpolate
+from .limits import fluid_limits
 from .smoothing import SMOOTHING, SUPPORT
 from .viscosities import Viscosity
-
-if TYPE_CHECKING:
-    from ...engine.model import Model
-    from ...engine.probing.probe import Probe
-    from ...engine.state import State
-    from ...instruments.stability.report import Limit
 
 # What laws may name beside smoothing_length, rest_density and the parameters of their part.
 VARIABLES = {
@@ -78,7 +76,7 @@ class SPH(Interaction):
         ...     SPH(water, smoothing_length=0.2, rest_density=1000.0,
         ...         equation_of_state=Tait(sound_speed=30.0)))
         >>> sim = Simulation(scene, Settings(dt=1 / 60, substeps=20), device="cpu")
-        >>> fluid.interpolate([(0.5, 0.5, 0.5)], "density").round(-2).tolist()
+        >>> sim.interpolate(fluid, [(0.5, 0.5, 0.5)], "density").round(-2).tolist()
         [1000.0]
     """
 
@@ -246,8 +244,6 @@ class SPH(Interaction):
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By sound with viscosity, and by acceleration."""
-        from .limits import fluid_limits
-
         return fluid_limits(self, probe)
 
     def sound_speeds(self, probe: Probe) -> np.ndarray:
@@ -278,31 +274,9 @@ class SPH(Interaction):
         )
         self._launch(self._kernel(term, store, Out, 1), out)
 
-    def interpolate(
-        self, points: Any, field: Any, *, world: int = 0, normalized: bool = False
-    ) -> np.ndarray:
-        """A field of the fluid anywhere: A(r) = sum_j m_j A_j / rho_j W(|r - r_j|, h).
-
-        (Monaghan 2005, sec. 2.) At the present positions of the simulation made last. Away from
-        the fluid it is 0; at a free surface it falls to 0 over 2 h, like the sum of the weights.
-
-        Args:
-            points: Where, (k, 3) [length].
-            field: ``"density"``, ``"velocity"`` or another array of the state or attribute of the
-                particles by name; or values, (n,) or (n, 3), of the fluid's particles in order or
-                of all particles of the world.
-            world: Whose fluid.
-            normalized: Divide by sum_j m_j / rho_j W (Shepard 1968), which makes constants exact
-                up to the surface.
-
-        Returns:
-            (k,) or (k, 3), float64.
-
-        Raises:
-            ValueError: Points or values of wrong shape or not finite, a world or name that is
-                not there.
-        """
-        return interpolate(self.bound, points, field, world, normalized)
+    def interpolate(self, points: Any, field: Any, **options: Any) -> np.ndarray:
+        """Of a simulation: ``sim.interpolate(fluid, points, field)``."""
+        raise self._elsewhere("interpolate", "points", "field")
 
 
 def _of_kind(owner: str, argument: str, value: Any, kind: type, example: str) -> Any:

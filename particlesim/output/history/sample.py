@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
 
+from ...engine.source import Source
 from ...instruments.diagnostics import measure
 from ...instruments.residuals import residuals
 from ...interactions.fluid.sph import SPH
 
-if TYPE_CHECKING:
-    from ...simulation.simulation import Simulation
 
-
-def sample(sim: Simulation) -> dict[str, np.ndarray]:
+def sample(sim: Source) -> dict[str, np.ndarray]:
     """One row of a history: name to (worlds,), float64."""
     with _undisturbed(sim):
         potentials: list[np.ndarray] = []
@@ -56,7 +54,7 @@ def _labels(parts: Iterable[Any]) -> list[str]:
     return labels
 
 
-def _density_error(fluid: SPH, sim: Simulation) -> tuple[np.ndarray, np.ndarray]:
+def _density_error(fluid: SPH, sim: Source) -> tuple[np.ndarray, np.ndarray]:
     """rho / rho0 - 1 of the fluid's particles, and their worlds."""
     members = fluid.pairs.members_host
     world = sim.model.world_of[members]
@@ -66,13 +64,13 @@ def _density_error(fluid: SPH, sim: Simulation) -> tuple[np.ndarray, np.ndarray]
 
 
 def _figures(
-    name: str, label: str, values: np.ndarray, world: np.ndarray, sim: Simulation
+    name: str, label: str, values: np.ndarray, world: np.ndarray, sim: Source
 ) -> dict[str, np.ndarray]:
     """The largest and the root mean square of each world; 0 where there is none."""
-    count = np.bincount(world, minlength=sim.world_count)
-    largest = np.full(sim.world_count, -np.inf)
+    count = np.bincount(world, minlength=sim.model.world_count)
+    largest = np.full(sim.model.world_count, -np.inf)
     np.maximum.at(largest, world, values)
-    square = np.bincount(world, values**2, sim.world_count) / np.maximum(count, 1)
+    square = np.bincount(world, values**2, sim.model.world_count) / np.maximum(count, 1)
     return {
         f"{name}_max:{label}": np.where(count > 0, largest, 0.0),
         f"{name}_rms:{label}": np.sqrt(square),
@@ -80,7 +78,7 @@ def _figures(
 
 
 @contextlib.contextmanager
-def _undisturbed(sim: Simulation) -> Iterator[None]:
+def _undisturbed(sim: Source) -> Iterator[None]:
     """Put back what measuring renews: neighbour rows, whose order decides about rounding, and
     densities, which belong to the last forces.
     """

@@ -16,16 +16,14 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
 from ... import validate
+from ...engine.source import Source
 from .. import files
 from .sample import sample
-
-if TYPE_CHECKING:
-    from ...simulation.simulation import Simulation
 
 SUFFIXES = (".csv", ".jsonl")
 OWN = ("frame", "time", "world")  # what every line starts with
@@ -66,7 +64,7 @@ class History:
 
     def __init__(
         self,
-        sim: Simulation,
+        sim: Source,
         path: str | os.PathLike[str],
         *,
         overwrite: bool = False,
@@ -93,7 +91,7 @@ class History:
         table = np.array(list(values.values()), dtype=np.float64)
         lines = [
             self._line([sim.frame, sim.time, w, *table[:, w].tolist()])
-            for w in range(sim.world_count)
+            for w in range(sim.model.world_count)
         ]
         self._append("".join(lines).encode())
 
@@ -150,9 +148,9 @@ class History:
             lines = [line for line in file if line.endswith("\n")]
         heading = lines[:1] if self.path.suffix == ".csv" else []
         past = read_history(self.path)
-        if past.world_count not in (0, self.sim.world_count):
+        if past.world_count not in (0, self.sim.model.world_count):
             raise validate.fail(
-                "History", "path", f"hold {self.sim.world_count} worlds", past.world_count,
+                "History", "path", f"hold {self.sim.model.world_count} worlds", past.world_count,
                 "go on with as many worlds as it began with",
             )  # fmt: skip
         count = int((past.frame < self.sim.frame).sum()) * max(1, past.world_count)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ... import validate
+from ...engine.source import Source
 from ..usd.recorder import UsdRecorder
 from .background import BackgroundWriter
 from .base import ParticleFrame, ParticleRecorder, Recorder
@@ -14,9 +15,6 @@ from .gsd import GsdRecorder
 from .npz import NpzRecorder
 from .ply import PlyRecorder
 from .vtkhdf import VtkhdfRecorder
-
-if TYPE_CHECKING:
-    from ...simulation.simulation import Simulation
 
 FORMATS: dict[str, Any] = {
     ".usda": UsdRecorder,
@@ -42,7 +40,7 @@ __all__ = [
 ]
 
 
-def open_recorder(sim: Simulation, path: str | os.PathLike[str], **options: Any) -> Recorder:
+def open_recorder(sim: Source, path: str | os.PathLike[str], **options: Any) -> Recorder:
     """The recorder for a file of this suffix.
 
     Args:

@@ -7,15 +7,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 
 from ... import validate
+from ...engine.source import Source
 from ..usd.fields import ParticleFields
-
-if TYPE_CHECKING:
-    from ...simulation.simulation import Simulation
 
 # What every frame has; a field cannot have these names.
 COLUMNS = ("position", "velocity", "radius", "id", "group", "world")
@@ -86,7 +84,7 @@ class ParticleRecorder(ABC):
 
     def __init__(
         self,
-        sim: Simulation,
+        sim: Source,
         path: str | os.PathLike[str],
         *,
         frames: int = 1,
@@ -128,10 +126,10 @@ class ParticleRecorder(ABC):
         if sim.frame % self.every:
             return None
         radius = sim.get("radius") if "radius" in sim.state else sim.model.column("radius")
-        x = sim.position
+        x = sim.get("position")
         columns = {
             "position": x,
-            "velocity": sim.velocity,
+            "velocity": sim.get("velocity"),
             "radius": radius.astype(x.dtype),
             **self._constant,
             **self.fields.read(),
@@ -184,8 +182,8 @@ class ParticleRecorder(ABC):
             "precision": sim.settings.precision,
             "fields": self.fields.names,
             "groups": self.group_names,
-            "worlds": sim.world_count,
-            "particles": sim.particle_count,
+            "worlds": sim.model.world_count,
+            "particles": sim.model.particle_count,
         }
 
     @property
@@ -233,11 +231,11 @@ class ParticleRecorder(ABC):
         )  # fmt: skip
 
 
-def _constant_columns(sim: Simulation) -> tuple[list[str], dict[str, np.ndarray]]:
+def _constant_columns(sim: Source) -> tuple[list[str], dict[str, np.ndarray]]:
     """Names of the groups, and the columns that never change: id, group and world."""
     names = list(dict.fromkeys(group.name for scene in sim.scenes for group in scene.groups))
-    ids = np.zeros(sim.particle_count, dtype=np.int32)
-    groups = np.zeros(sim.particle_count, dtype=np.int32)
+    ids = np.zeros(sim.model.particle_count, dtype=np.int32)
+    groups = np.zeros(sim.model.particle_count, dtype=np.int32)
     for w, scene in enumerate(sim.scenes):
         offset = int(sim.model.offsets[w])
         for group in scene.groups:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ... import validate
 from ...engine.execution.executors import available_threads
-from ...engine.model import select
+from ...engine.source import Source
 from ...interactions.fluid.sph import SPH
-from ...scene.scene import Group, Scene
+from ...scene.group import Group, select
+from ...scene.scene import Scene
 from .marching import Marching, Shape
 from .splashsurf import Splashsurf
-
-if TYPE_CHECKING:
-    from ...simulation.simulation import Simulation
 
 Mesh = tuple[np.ndarray, np.ndarray, np.ndarray]
 METHODS = ("marching_cubes", "splashsurf")
@@ -73,7 +71,7 @@ class Surface:
 
     def __init__(
         self,
-        sim: Simulation,
+        sim: Source,
         group: Any = None,
         world: int = 0,
         *,
@@ -110,7 +108,7 @@ class Surface:
             shape = Shape.anisotropic(smooth, threshold) if anisotropic else isotropic
             threads = sim.settings.threads or available_threads()
             self.method = Marching(
-                self.smoothing_length, self.spacing, shape, limit, sim.device, threads
+                self.smoothing_length, self.spacing, shape, limit, sim.model.device, threads
             )
 
     def mesh(self) -> Mesh:

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ... import validate
-from ...engine.model import select
+from ...engine.source import Source
 from ...interactions.fluid.sph import SPH
-from ...scene.scene import Group
+from ...scene.group import Group, select
+from ...scene.scene import Scene
+from ..surface.surface import Mesh, Surface
 from .info import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
 from .placement import closed, offsets, periodic_box
-
-if TYPE_CHECKING:
-    from ...scene.scene import Scene
-    from ...simulation.simulation import Simulation
-    from ..surface.surface import Mesh, Surface
 
 OWNER = "UsdRecorder"
 PLAYBACK_FPS = 24.0  # where a frame is not a sensible part of a second
@@ -69,7 +66,7 @@ class Drawing:
 
     def __init__(
         self,
-        sim: Simulation,
+        sim: Source,
         *,
         frames: int,
         frame_time: float,
@@ -107,7 +104,9 @@ class Drawing:
     def pairs(self) -> dict[LinksPrim, np.ndarray]:
         """The links that are whole now, of constraints that break."""
         # One copy from the device a constraint, not one a world.
-        broken = {part: part.broken for part in {each.constraint for each in self.breakable}}
+        broken = {
+            part: part.read_broken(part) for part in {each.constraint for each in self.breakable}
+        }
         return {each.prim: each.whole(broken[each.constraint]) for each in self.breakable}
 
     def meshes(self) -> dict[MeshPrim, Mesh]:
@@ -220,15 +219,15 @@ class Drawing:
                     yield shape
 
 
-def _chosen_worlds(sim: Simulation, given: Iterable[int] | None) -> list[int]:
+def _chosen_worlds(sim: Source, given: Iterable[int] | None) -> list[int]:
     """Numbers of worlds, in order."""
     if given is None:
-        return list(range(sim.world_count))
+        return list(range(sim.model.world_count))
     given = given if isinstance(given, Iterable) else [given]
     worlds = sorted({validate.whole(OWNER, "worlds", w) for w in given})
-    if not worlds or worlds[-1] >= sim.world_count:
+    if not worlds or worlds[-1] >= sim.model.world_count:
         raise validate.fail(
-            OWNER, "worlds", f"be some of 0 to {sim.world_count - 1}", worlds,
+            OWNER, "worlds", f"be some of 0 to {sim.model.world_count - 1}", worlds,
             "name worlds of this simulation",
         )  # fmt: skip
     return worlds

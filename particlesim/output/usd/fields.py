@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ... import validate
+from ...engine.source import Source
 from ...interactions.fluid.sph import SPH
 from .. import colors
-
-if TYPE_CHECKING:
-    from ...simulation.simulation import Simulation
 
 OWNER = "UsdRecorder"
 DERIVED = ("speed",)
@@ -33,7 +31,7 @@ class ParticleFields:
         ValueError: A name that the simulation has no such values for.
     """
 
-    def __init__(self, sim: Simulation, names: Iterable[str]):
+    def __init__(self, sim: Source, names: Iterable[str]):
         self.sim = sim
         self.names = list(dict.fromkeys([names] if isinstance(names, str) else names))
         for name in self.names:
@@ -62,7 +60,7 @@ class ParticleFields:
         if name in self.sim.state:
             return self.sim.get(name)
         if name == "speed":
-            v = self.sim.velocity
+            v = self.sim.get("velocity")
             return np.sqrt(np.einsum("ij,ij->i", v, v))
         return self.sim.model.column(name)
 
@@ -74,12 +72,12 @@ class ParticleFields:
                 fluid.update_density()
 
 
-def readable(sim: Simulation) -> list[str]:
+def readable(sim: Source) -> list[str]:
     """Names of the values that there is one of for each particle."""
     held = {
         name
         for name, array in sim.state.arrays.items()
-        if len(array) == sim.particle_count and name not in ("image", "time")
+        if len(array) == sim.model.particle_count and name not in ("image", "time")
     }
     return sorted(held | set(sim.model.attributes) | set(DERIVED))
 
@@ -99,9 +97,7 @@ class ParticleColors:
         ValueError: A name or a colour map that is not known, a range that is none.
     """
 
-    def __init__(
-        self, sim: Simulation, by: str, color_map: Any, color_range: Any, rows: np.ndarray
-    ):
+    def __init__(self, sim: Source, by: str, color_map: Any, color_range: Any, rows: np.ndarray):
         self.by, self.color_map, self.rows = by, color_map, rows
         self.values = ParticleFields(sim, [by])
         colors.table(color_map)

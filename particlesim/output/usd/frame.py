@@ -10,7 +10,6 @@ import numpy as np
 from pxr import Sdf, Tf
 
 from ... import validate
-from .geometry import vertex_normals
 from .info import LinksPrim, MeshPrim, PointsPrim, StageInfo, particle_ids, row_indices
 from .info import row_pairs as checked_pairs
 from .shapes import Shape
@@ -264,3 +263,21 @@ def _whole(name: str, array: np.ndarray) -> np.ndarray:
     if len(array) and (array.min() < limits.min or array.max() > limits.max):
         raise validate.fail(OWNER, name, "fit into 32 bits", array, "number from 0")
     return np.ascontiguousarray(array, dtype=np.int32)
+
+
+def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals of points (n, 3): means of their triangles' (t, 3), weighted by area; float32.
+
+    A point without area around it has (0, 0, 1): a direction that renderers can use.
+    """
+    x = points.astype(np.float64)
+    a, b, c = (x[triangles[:, k]] for k in range(3))
+    twice_area = np.cross(b - a, c - a)
+    corners = triangles.ravel()
+    normals = np.stack(
+        [np.bincount(corners, np.repeat(twice_area[:, k], 3), len(x)) for k in range(3)], axis=1
+    )
+    length = np.linalg.norm(normals, axis=1)
+    flat = length == 0
+    normals[flat], length[flat] = (0.0, 0.0, 1.0), 1.0
+    return (normals / length[:, None]).astype(np.float32)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from pxr import Gf
 
-if TYPE_CHECKING:
-    from .frame import Frame
-    from .info import StageInfo
-    from .shapes import Shape
+from .frame import Frame
+from .info import StageInfo
+from .shapes import Shape
 
 FOCAL_LENGTH = 35.0
 APERTURE = np.array([36.0, 20.25])  # 16:9, in the units of the focal length
@@ -38,24 +36,6 @@ def extent(points: np.ndarray, width: np.ndarray | float | None) -> np.ndarray:
     lower = [(x - half).min() if half.ndim else x.min() - half for x in columns]
     upper = [(x + half).max() if half.ndim else x.max() + half for x in columns]
     return np.array([lower, upper], dtype=np.float32)
-
-
-def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals of points (n, 3): means of their triangles' (t, 3), weighted by area; float32.
-
-    A point without area around it has (0, 0, 1): a direction that renderers can use.
-    """
-    x = points.astype(np.float64)
-    a, b, c = (x[triangles[:, k]] for k in range(3))
-    twice_area = np.cross(b - a, c - a)
-    corners = triangles.ravel()
-    normals = np.stack(
-        [np.bincount(corners, np.repeat(twice_area[:, k], 3), len(x)) for k in range(3)], axis=1
-    )
-    length = np.linalg.norm(normals, axis=1)
-    flat = length == 0
-    normals[flat], length[flat] = (0.0, 0.0, 1.0), 1.0
-    return (normals / length[:, None]).astype(np.float32)
 
 
 def world_boxes(info: StageInfo, frame: Frame) -> dict[int, np.ndarray]:

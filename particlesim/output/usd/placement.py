@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ... import validate
-
-if TYPE_CHECKING:
-    from ...scene.scene import Scene
-    from ...simulation.simulation import Simulation
+from ...engine.source import Source
+from ...scene.scene import Scene
 
 GRID_GAP = 0.2  # between worlds, in parts of the largest
 
@@ -61,7 +59,7 @@ def _reach(scene: Scene) -> np.ndarray:
     return np.where(longest > 0, longest, 1.0)
 
 
-def periodic_box(sim: Simulation) -> tuple[np.ndarray, np.ndarray] | None:
+def periodic_box(sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
     """The box, where all worlds have the same."""
     length, lower = sim.model.box_length, sim.model.box_lower
     if not sim.model.periodic or np.ptp(length, axis=0).any() or np.ptp(lower, axis=0).any():

@@ -5,17 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
 from ... import validate
+from ...engine.source import Source
 from .drawing import Drawing
 from .fields import ParticleColors, ParticleFields
 from .writer import UsdWriter
-
-if TYPE_CHECKING:
-    from ...simulation.simulation import Simulation
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +82,7 @@ class UsdRecorder:
 
     def __init__(
         self,
-        sim: Simulation,
+        sim: Source,
         path: str | os.PathLike[str],
         *,
         frames: int = 1,
@@ -148,7 +146,7 @@ class UsdRecorder:
             fields["displayColor"] = self.colors.read()
             changing["notes"] = self.colors.notes()
         number = sim.frame // self.every
-        return FrameData(number, sim.position, sim.velocity, fields, changing)
+        return FrameData(number, sim.get("position"), sim.get("velocity"), fields, changing)
 
     def write_frame(self, frame: FrameData | None) -> None:
         """Write what :meth:`capture` returned; touches no simulation."""

@@ -6,24 +6,22 @@ import os
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ... import validate
+from ...engine.source import Source
 from .camera import Camera
 from .geometry import Geometry
 from .image import FORMATS, Image, check_output, pillow
 from .look import BACKGROUND, Look
 from .renderer import Renderer
-
-if TYPE_CHECKING:
-    from ...simulation.simulation import Simulation
-    from .stage import View
+from .stage import View
 
 
 def render(
-    sim: Simulation,
+    sim: Source,
     path: str | os.PathLike[str] | None,
     width: int,
     height: int,
@@ -51,7 +49,7 @@ def render(
             f"Simulation.render: camera must be a Camera, got {camera!r}; use Camera(...)."
         )
     chosen = None if worlds is None else list(worlds)
-    several = (sim.world_count if chosen is None else len(chosen)) > 1
+    several = (sim.model.world_count if chosen is None else len(chosen)) > 1
     view = seen(
         sim, color_by=color, color_map=color_map, color_range=color_range, worlds=chosen,
         groups=groups, layout=layout if several else None, surface=surface,
@@ -63,7 +61,7 @@ def render(
     if camera is None:
         points, radius = view.geometry.points()
         camera = Camera.around(points, view.up, width / height, radius)
-    image = draw(view.geometry, camera, width, height, look, sim.device)
+    image = draw(view.geometry, camera, width, height, look, sim.model.device)
     if path is not None:
         image.save(path, overwrite=overwrite)
     return image
@@ -80,7 +78,7 @@ def draw(
         renderer.close()
 
 
-def seen(sim: Simulation, **recorded: Any) -> View:
+def seen(sim: Source, **recorded: Any) -> View:
     """What there is to see of a simulation: what a recording of it would show.
 
     Args:
@@ -91,7 +89,7 @@ def seen(sim: Simulation, **recorded: Any) -> View:
     from ...output.usd_tools.recording import Recording
     from .stage import View, look_at
 
-    if not sim.particle_count:
+    if not sim.model.particle_count:
         axis = np.eye(3)["xyz".index(sim.scenes[0].up_axis)]
         return View(Geometry(), axis, None, None)
     with tempfile.TemporaryDirectory(prefix="particlesim-") as folder:
@@ -121,7 +119,7 @@ def ground_height(view: View, ground: bool | float | None) -> float | None:
     return validate.number("render", "ground", ground, unit="length")
 
 
-def notebook_picture(sim: Simulation) -> bytes | None:
+def notebook_picture(sim: Source) -> bytes | None:
     """A picture as PNG; None where Pillow is missing, so that a notebook shows text instead."""
     try:
         pillow()

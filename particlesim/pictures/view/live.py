@@ -6,14 +6,12 @@ import tempfile
 import threading
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ...engine.source import Runner
 from ...output.usd.recorder import UsdRecorder
 from ...output.usd.writer import UsdWriter
 from .footage import Footage
-
-if TYPE_CHECKING:
-    from ...simulation.simulation import Simulation
 
 
 class Live:
@@ -28,7 +26,7 @@ class Live:
         title: What the page calls it.
     """
 
-    def __init__(self, sim: Simulation, frames: int, fields: Iterable[str] = (), title: str = ""):
+    def __init__(self, sim: Runner, frames: int, fields: Iterable[str] = (), title: str = ""):
         self.sim, self.frames, self.fields, self.title = sim, frames, tuple(fields), title
         self.take, self.done, self.playing = 0, 0, False
         self.error: str | None = None
@@ -89,7 +87,7 @@ class Live:
         path = Path(self._folder.name) / f"take_{self.take}.usda"
         self._recorder = UsdRecorder(
             self.sim, path, frames=self.frames, fields=self.fields,
-            layout="grid" if self.sim.world_count > 1 else None,
+            layout="grid" if self.sim.model.world_count > 1 else None,
         )  # fmt: skip
         self._recorder.write()
         self.footage = Footage(path)

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
-from ..instruments.stability.report import Limit
-
-if TYPE_CHECKING:
-    from ..engine.probing.probe import Probe
-    from .gravity import Gravity
+from ..engine.probing.limit import Limit
+from ..engine.probing.probe import Probe
 
 MOST = 4096  # bodies of a world whose pairs are all looked at
 FRAMES = 10  # ahead, within which they meet
 PHASE = 0.5  # omega dt at the pericentre; leapfrog's energy is off by about a third of its square
 
 
-def closest_approach(part: Gravity, probe: Probe) -> list[Limit]:
+def closest_approach(part: Any, probe: Probe) -> list[Limit]:
     """The pericentre of every body around the one that pulls it most.
 
     Two bodies follow a conic while the tide of all others is less than what they pull each other
@@ -33,7 +30,7 @@ def closest_approach(part: Gravity, probe: Probe) -> list[Limit]:
     return [min(found, key=lambda limit: limit.dt)] if found else []
 
 
-def _of_world(part: Gravity, peer: Gravity, probe: Probe, w: int, rows: np.ndarray) -> list[Limit]:
+def _of_world(part: Any, peer: Any, probe: Probe, w: int, rows: np.ndarray) -> list[Limit]:
     G, s = peer.parameters["constant"], peer.parameters["softening"]
     m, x, v = probe.mass[rows], probe.position[rows], probe.velocity[rows]
     free = probe.inverse_mass[rows] > 0
@@ -71,3 +68,17 @@ def _of_world(part: Gravity, peer: Gravity, probe: Probe, w: int, rows: np.ndarr
     )
     dt = float(PHASE / omega[k]) if np.isfinite(omega[k]) else 0.0
     return [Limit(part.name, "approach", dt, reason, *probe.place(int(rows[k])))]
+
+
+def closest_passage(part: Any, probe: Probe) -> list[Limit]:
+    """The heaviest two at the softening length's depth: omega^2 = G (m_i + m_j) / s^3."""
+    found = []
+    for w, peer in enumerate(part.peers):
+        members = part.pairs.members_host[probe.model.world_of[part.pairs.members_host] == w]
+        s, G = peer.parameters["softening"], abs(peer.parameters["constant"])
+        mass = np.sort(probe.mass[members])[-2:]
+        if s > 0 and G > 0 and len(mass) == 2:
+            omega = float(np.sqrt(G * mass.sum() / s**3))
+            reason = f"2 / omega, omega = {omega:.4g} /s = sqrt(G (m_i + m_j) / softening^3)"
+            found.append(Limit(part.name, "passage", 2.0 / omega, reason, w))
+    return [min(found, key=lambda limit: limit.dt)] if found else []

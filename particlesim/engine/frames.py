@@ -1,0 +1,101 @@
+"""Frames: recorded once, run as often as asked, and again when a row of neighbours was full."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+import warp as wp
+
+from ..kernels.instruments.watchdog import peak_kernel
+from .execution.executors import Executor
+from .execution.launch import Frame, launch, record
+from .loop import Loop
+from .snapshot import Snapshot
+from .state import State
+
+
+class Guard(Protocol):
+    """Who looks at the state at the end of every frame."""
+
+    def look(self, state: State) -> None:
+        """Launches only."""
+
+    def forget(self) -> None:
+        """What was seen is void: the frame is done again."""
+
+
+class Frames:
+    """The ways a loop's frame is run, by its number of substeps.
+
+    Args:
+        loop: With all its observers.
+        guard: Looks at the end of a frame.
+    """
+
+    def __init__(self, loop: Loop, guard: Guard):
+        self.loop, self.guard = loop, guard
+        self.snapshot = Snapshot(loop)
+        self._executors: dict[int, Executor] = {}
+        self._generation = 0
+
+    def executor(self, substeps: int) -> Executor:
+        """What runs a frame of so many substeps; made on first use."""
+        generation = self.loop.neighbors.generation
+        if self._generation != generation:
+            self.close()  # what was recorded points to rows that were too short
+            self._generation = generation
+        if substeps not in self._executors:
+            self._executors[substeps] = self._new(substeps)
+        return self._executors[substeps]
+
+    def run(self, substeps: int) -> None:
+        """One frame. Nothing is ever left out of a full row: back to its start, and again."""
+        self.executor(substeps).run()
+        while self.loop.neighbors.overflowing:
+            self._restart()
+            self.executor(substeps).run()
+
+    def peaks(self, substeps: int) -> np.ndarray:
+        """One frame, and the largest |v_a| that each particle had at the end of a substep, (n,)."""
+        model = self.loop.model
+        peak = model.array(np.zeros(model.particle_count), model.precision.scalar)
+        while True:
+            executor = self._new(substeps, peak)
+            executor.run()
+            executor.close()
+            if not self.loop.neighbors.overflowing:
+                return peak.numpy().astype(np.float64)
+            self._restart()
+            peak.zero_()
+
+    def close(self) -> None:
+        """Let go of graphs and threads."""
+        for executor in self._executors.values():
+            executor.close()
+        self._executors.clear()
+
+    def _restart(self) -> None:
+        """Make room in the rows that were full, and go back to the start of the frame."""
+        self.loop.neighbors.lengthen()
+        self.snapshot.restore()
+        self.guard.forget()
+
+    def _new(self, substeps: int, peak: wp.array | None = None) -> Executor:
+        frame = self._record(substeps, peak)
+        return Executor(frame, self.loop.settings, self.loop.model.device)
+
+    def _record(self, substeps: int, peak: wp.array | None) -> Frame:
+        """A frame of so many substeps; ``peak``: where to note the largest speeds."""
+        loop, frame = self.loop, Frame(repeat=substeps)
+        model, state = loop.model, loop.state
+        with record(frame.before):
+            self.snapshot.take()
+        with record(frame.substep):
+            loop.substep(loop.settings.dt / substeps)
+            if peak is not None:
+                kernel = peak_kernel(model.precision)
+                launch(kernel, model.particle_count, [state.velocity, peak], model.device)
+        with record(frame.after):
+            self.guard.look(state)
+        return frame

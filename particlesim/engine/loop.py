@@ -1,0 +1,159 @@
+"""The loop: what moves, and one substep of it, on one screen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from .. import validate
+from ..scene.part import ConstraintBase, Interaction, Part
+from ..scene.scene import Scene
+from ..scene.settings import Settings
+from . import batch
+from .execution.launch import owner
+from .integrators import METHODS
+from .model import Model
+from .neighbors.lists import Neighbors
+from .observers import FINISH, FORCE, PROJECT, Observers
+from .state import State
+
+Fuse = Callable[[Sequence[Interaction]], list[Interaction]]
+
+
+class Loop:
+    """Scenes in motion: their model, state, neighbours, parts and integrator.
+
+    Args:
+        scenes: One for each world, of one kind.
+        settings: With numbers for ``dt`` and ``substeps``.
+        device: As of :func:`~particlesim.engine.model.choose_device`.
+        fuse: Makes the passes that evaluate the interactions; by default one for each.
+    """
+
+    def __init__(
+        self, scenes: Sequence[Scene], settings: Settings, device: Any = None, fuse: Fuse = list
+    ):
+        self.scenes, self.settings = list(scenes), settings
+        self.model = model = Model(scenes, settings, device)
+        self.frame = 0
+        # What is prepared allocates only what it requires.
+        self.interactions: list[Interaction] = batch.bound([each.interactions for each in scenes])
+        self.constraints: list[ConstraintBase] = batch.bound([each.constraints for each in scenes])
+        self.state, self.neighbors = State(model), Neighbors(model)
+        for part in self.parts:
+            part.prepare(model, self.neighbors)
+        required = frozenset[str]().union(*(part.requires for part in self.parts))
+        method = METHODS[settings.integrator]
+        if self.constraints and method.carries_forces:
+            raise validate.fail(
+                "Settings", "integrator", "be symplectic_euler in a scene with constraints",
+                settings.integrator, "or leave the constraints out",
+            )  # fmt: skip
+        self.state.require({"position", "velocity"} | required)
+        self.integrator = method(
+            model, self.state, constrained=bool(self.constraints),
+            remember="previous_position" in required,
+        )  # fmt: skip
+        self.neighbors.allocate(self.state)
+        for part in self.parts:
+            part.attach(model, self.state)
+        self.passes = fuse(self.interactions)
+        self.observers = Observers()
+        self.unknown_forces = set(range(model.world_count))  # worlds, for a first kick
+
+    def substep(self, dt: float) -> None:
+        """Advance by ``dt``: interactions, integration, constraints, velocities."""
+        self.observers.begin(dt)
+        self.integrator.begin(dt)
+        self.forces(dt)
+        self.integrator.advance(dt)
+        self.constrain(dt, self.settings.iterations)
+        self.integrator.finish(dt)
+        for constraint in self.constraints:
+            with self.observers.acting(constraint, FINISH):
+                constraint.finish(self.state, self.neighbors, dt)
+        self.observers.end(dt)
+
+    def forces(self, dt: float) -> None:
+        """Interactions add forces at the present positions."""
+        self.neighbors.update(self.state)
+        self.state.clear_forces()
+        for interaction in self.passes:
+            with self.observers.acting(interaction, FORCE):
+                interaction.apply(self.state, self.neighbors, dt)
+
+    def constrain(self, dt: float, iterations: int) -> None:
+        """Constraints project the positions, one after the other, in each iteration."""
+        if not self.constraints:
+            return
+        self.neighbors.update_for_constraints(self.state)
+        for constraint in self.constraints:
+            with owner(constraint.name):
+                constraint.begin(self.state, self.neighbors, dt)
+        for _ in range(iterations):
+            for constraint in self.constraints:
+                with self.observers.acting(constraint, PROJECT):
+                    constraint.project(self.state, self.neighbors, dt)
+
+    # Outside a substep ------------------------------------------------------------------------
+
+    def know_forces(self) -> None:
+        """Evaluate the forces that a first kick starts from, in worlds where they are not known."""
+        if not self.integrator.carries_forces or not self.unknown_forces:
+            return
+        known = set(range(self.model.world_count)) - self.unknown_forces
+        carried = []
+        if known and "force" in self.state:
+            carried = [self.state.force, *self.observers.carried()]
+        before = [each.numpy().copy() for each in carried]
+        self.forces(self.settings.substep)
+        if self.neighbors.grow():
+            self.forces(self.settings.substep)
+        keep = np.isin(self.model.world_of, list(known))
+        for each, old in zip(carried, before, strict=True):
+            # Forces that depend on velocity would not come out as they were within the step.
+            force = each.numpy().copy()
+            force[keep] = old[keep]
+            each.assign(force)
+        self.unknown_forces.clear()
+
+    def place_on_constraints(self, iterations: int) -> None:
+        """Move positions onto the constraints, rigidly and without giving velocity."""
+        if "previous_position" in self.state:
+            wp.copy(self.state.previous_position, self.state.position)
+        # Without a time scale compliance is nothing: alpha / dt^2 = 0.
+        self.constrain(math.inf, iterations)
+        self.neighbors.grow()
+
+    @property
+    def parts(self) -> list[Interaction | ConstraintBase]:
+        """All interactions, then all constraints."""
+        return [*self.interactions, *self.constraints]
+
+    def bound(self, owner: str, part: Part) -> Any:
+        """The copy of a scene's part that is in motion here.
+
+        Raises:
+            ValueError: It is no part of these scenes.
+        """
+        for each in self.parts:
+            if part is each or any(part is peer for peer in each.peers):
+                return each
+        names = ", ".join(each.name for each in self.parts)
+        raise validate.fail(
+            owner, "part", "belong to a scene of this simulation", part,
+            f"name one of its own ({names})",
+        )  # fmt: skip
+
+    @property
+    def time(self) -> float:
+        """Simulated time since the start [s]."""
+        return self.frame * self.settings.dt
+
+    def get(self, name: str) -> np.ndarray:
+        """A per-particle array, copied to the host."""
+        return self.state[name].numpy().copy()

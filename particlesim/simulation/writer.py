@@ -1,0 +1,87 @@
+"""Writing into a running simulation: values of particles, and worlds back to their start."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from .. import validate
+from ..engine.frames import Frames
+from ..instruments.ledger.accounts import Accounts, motion
+from ..instruments.watchdog.watch import Watchdog
+
+
+class Writer:
+    """Writes, and has all who derive something from what is written forget it."""
+
+    def __init__(self, frames: Frames, watchdog: Watchdog, accounts: Accounts | None):
+        self.frames, self.loop = frames, frames.loop
+        self.watchdog, self.accounts = watchdog, accounts
+
+    def set(self, name: str, value: Any, rows: slice) -> None:
+        """Write rows of a per-particle array (see :meth:`Simulation.set`)."""
+        owner, model, state = "Simulation.set", self.loop.model, self.loop.state
+        array = state[name]
+        host = array.numpy().copy()
+        shape = host[rows].shape
+        width = shape[1] if len(shape) == 2 else None
+        host[rows] = validate.rows(owner, name, value, shape[0], width)
+        if name == "mass" and not (host[rows] > 0).all():
+            raise validate.fail(owner, "mass", "be above 0", float(host[rows].min()), "give a mass")
+        largest = model.column("radius").max() if name == "radius" else np.inf
+        if name == "radius" and host.max() > largest:
+            raise validate.fail(
+                owner, "radius", "be at most the largest at the start, which contacts are looked "
+                f"for by ({largest:g})", float(host.max()),
+                "give the scene the largest that it will have",
+            )  # fmt: skip
+        before = None if self.accounts is None else motion(model, state)
+        array.assign(host)
+        if name == "mass" and "inverse_mass" in state:
+            # Pinned particles stay pinned.
+            inverse = self.loop.get("inverse_mass")
+            inverse[rows] = np.where(inverse[rows] > 0, 1.0 / host[rows], 0.0)
+            state.inverse_mass.assign(inverse)
+        if self.accounts is not None and before is not None:
+            self.accounts.written(before)
+        error = f"{name}_error"
+        if error in state:
+            kept = self.loop.get(error)
+            kept[rows] = 0
+            state[error].assign(kept)
+        self._derive(name, np.unique(model.world_of[rows]).tolist())
+
+    def _derive(self, name: str, worlds: list[int]) -> None:
+        """Have what depends on an array follow it, in these worlds."""
+        if name == "position":
+            self.loop.neighbors.renew(self.loop.state, worlds)
+            for part in self.loop.parts:
+                part.placed(worlds)
+        if name in ("position", "velocity"):
+            self.watchdog.placed(self.loop, worlds)
+        self.loop.unknown_forces.update(worlds)
+
+    def reset(self, worlds: Iterable[int] | None) -> None:
+        """Put worlds back to their start (see :meth:`Simulation.reset`)."""
+        owner, loop = "Simulation.reset", self.loop
+        count = loop.model.world_count
+        given = range(count) if worlds is None else worlds
+        given = given if isinstance(given, Iterable) else [given]
+        chosen = sorted({validate.whole(owner, "worlds", w) for w in given})
+        if chosen and chosen[-1] >= count:
+            raise validate.fail(
+                owner, "worlds", f"be from 0 to {count - 1}", chosen[-1],
+                "name worlds of this simulation",
+            )  # fmt: skip
+        if len(chosen) == count:
+            loop.frame = 0
+        loop.state.reset(chosen)
+        loop.neighbors.renew(loop.state, chosen)
+        for part in loop.parts:
+            part.reset(chosen)
+        self.watchdog.reset(self.frames, chosen)
+        if self.accounts is not None:
+            self.accounts.begin_anew(chosen)
+        loop.unknown_forces.update(chosen)
