@@ -1,62 +1,64 @@
-"""Surface: a fluid's surface as a mesh of triangles."""
+"""Surface: a fluid's surface as a mesh of triangles, by splashsurf."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ... import validate
-from ...engine.execution.executors import available_threads
 from ...engine.source import Source
 from ...interactions.fluid.sph import SPH
 from ...scene.group import Group, select
 from ...scene.scene import Scene
-from .marching import Marching, Shape
-from .splashsurf import Splashsurf
 
 Mesh = tuple[np.ndarray, np.ndarray, np.ndarray]
-METHODS = ("marching_cubes", "splashsurf")
 SPACINGS = 1.3  # particle spacings in a smoothing length, where only the particles' size is known
+LEVEL = 0.63  # of a flat face of a cubic lattice of that spacing, half a spacing above its end
+MESH_STEPS, NORMAL_STEPS = 10, 3  # of smoothing at most, at the usual spacing
+FINEST = 100  # grid's spacings in a smoothing length
+FARTHEST = 2**20  # nodes along an axis, so that places in float32 are good to a part of a spacing
+GONE = {
+    "anisotropic": "surfaces are smoothed as meshes now: give smooth=0 for the plain level",
+    "method": "all surfaces are by splashsurf",
+    "node_limit": "the grid lies around the surface only: give a coarser spacing to save time",
+}
 
 
 class Surface:
     """The surface of a fluid, or of any group of particles, as a closed mesh of triangles.
 
-    The particles' volumes are smeared out by kernels, and marching cubes follow the level where
-    their sum ends (Yu and Turk 2013, "Reconstructing surfaces of particle-based fluids using
-    anisotropic kernels"):
+    By the library splashsurf. Marching cubes follow a level of the particles' colour field
 
-        phi(r) = sum_j V_j det(G_j) W(|G_j (r - c_j)|),   V_j = m_j / rho_j
+        phi(r) = sum_j V_j W(|r - x_j|),   1 / V_j = sum_k W(|x_j - x_k|)
 
-    with Wendland's C2 function W. Anisotropic kernels are flattened along the surface by G_j, from
-    the covariance of the particles within 2 h, and their centres c_j lie ``smooth`` of the way to
-    the mean of these: bumps of the size of a particle vanish. Isotropic ones are SPH's own,
-    c_j = x_j and G_j = 1 / h. Particles with fewer than six others around them are drops of about
-    their own volume. What is thinner than ``spacing`` may be lost. A periodic box counts as open:
-    the surface closes at its sides.
+    with the cubic spline W of support 2 h, in which particles count alike whatever their mass.
+    Then steps of Laplacian smoothing, which spare single drops, take away bumps of the size of a
+    particle (Löschner, Böttcher, Jeske and Bender 2023, "Weighted Laplacian smoothing for surface
+    reconstruction of particle-based fluids"). What is thinner than ``spacing`` may be lost. A
+    periodic box counts as open: the surface closes at its sides.
 
     Args:
         sim: The simulation; each :meth:`mesh` is of its present state.
         group: Whose surface: a Group or its name, several, or indices in the scene; None: the
             fluids of the world's SPH, or all particles where there is none.
         world: Of which world.
-        spacing: Of the grid [length], above 0; None: h / 2.6, half a particle spacing of water.
-            The grid lies fixed in space, and only where particles are.
+        spacing: Of the grid [length], at least h / 100; None: h / 2.6, half a particle spacing of
+            water. The grid lies fixed in space, and only where particles are.
         threshold: The level of phi, above 0; None: that which puts a flat face where the fluid
             ends, half a particle spacing above the outermost layer (on a cubic lattice at
-            h = 1.3 spacings); 0.6 for splashsurf.
-        smoothing_length: h [length]; None: that of the group's SPH, else 2.6 mean radii.
-        anisotropic: Flatten the kernels; with splashsurf, smooth the mesh.
-        smooth: How far centres move to the mean around them, 0 to 1. Faces are smoothest at about
-            a half; more rounds edges further.
-        method: ``"marching_cubes"``, on the simulation's device; or ``"splashsurf"``, the program
-            of that name (``pip install particlesim[surface]``), on the CPU.
-        node_limit: Most nodes that the grid may have, about 30 bytes each.
+            h = 1.3 spacings).
+        smoothing_length: h [length]; None: that of the group's SPH, at most 1.3 spacings of its
+            particles at rest; else 2.6 mean radii.
+        smooth: How much the mesh is smoothed, 0 (not at all) to 1 (10 steps); more takes off more
+            of what bulges out: at 0.5, 1/20 of a spacing of a ball of 10 spacings.
+        **gone: What is not there any more is refused: ``anisotropic`` (there are no kernels of Yu
+            and Turk), ``method`` and ``node_limit``.
 
     Raises:
         ValueError: A value out of range, a group or world that is not there, particles of no size.
-        ImportError: splashsurf is not installed.
+        ImportError: pysplashsurf is not installed.
 
     Example:
         >>> from particlesim import Scene, Simulation, sample
@@ -78,38 +80,47 @@ class Surface:
         spacing: float | None = None,
         threshold: float | None = None,
         smoothing_length: float | None = None,
-        anisotropic: bool = True,
         smooth: float = 0.5,
-        method: str = "marching_cubes",
-        node_limit: int = 2**26,
+        **gone: Any,
     ):
-        self.sim, self.world = sim, sim.world(world)
+        for name in gone:
+            remedy = GONE.get(name, "look at the arguments that there are")
+            raise TypeError(f"Surface: {name} must be left out, got {gone[name]!r}; {remedy}.")
+        if validate.whole("Surface", "world", world) >= len(sim.scenes):
+            raise validate.fail(
+                "Surface", "world", f"be from 0 to {len(sim.scenes) - 1}", world,
+                "name a world of this simulation",
+            )  # fmt: skip
+        self.sim, self.world, self.scene = sim, world, sim.scenes[world]
         self.rows = self._rows(group)
         h = self._smoothing_length() if smoothing_length is None else smoothing_length
-        self.smoothing_length = validate.number(
+        self.smoothing_length = h = validate.number(
             "Surface", "smoothing_length", h, above=0.0, unit="length"
         )
-        self.spacing = validate.number(
-            "Surface", "spacing", self.smoothing_length / 2.6 if spacing is None else spacing,
-            above=0.0, unit="length",
-        )  # fmt: skip
-        if threshold is not None:
-            threshold = validate.number("Surface", "threshold", threshold, above=0.0)
+        wanted = h / (2 * SPACINGS) if spacing is None else spacing
+        self.spacing = validate.number("Surface", "spacing", wanted, above=0.0, unit="length")
+        if self.spacing < h / FINEST:
+            raise validate.fail(
+                "Surface", "spacing", f"be at least {h / FINEST:g} [length]", spacing,
+                f"at most {FINEST} nodes fit into a smoothing length",
+            )  # fmt: skip
+        level = validate.number(
+            "Surface", "threshold", LEVEL if threshold is None else threshold, above=0.0
+        )
         smooth = validate.number("Surface", "smooth", smooth, minimum=0.0, maximum=1.0)
-        limit = validate.whole("Surface", "node_limit", node_limit, minimum=1)
-        validate.choice("Surface", "method", method, METHODS)
-        self.method: Marching | Splashsurf
-        if method == "splashsurf":
-            self.method = Splashsurf(
-                self.smoothing_length, self.spacing, threshold, smoothed=anisotropic
-            )
-        else:
-            isotropic = Shape.isotropic(threshold)
-            shape = Shape.anisotropic(smooth, threshold) if anisotropic else isotropic
-            threads = sim.settings.threads or available_threads()
-            self.method = Marching(
-                self.smoothing_length, self.spacing, shape, limit, sim.model.device, threads
-            )
+        # A step smooths over the length of an edge, and so many over its square.
+        steps = MESH_STEPS * (h / (2 * SPACINGS) / self.spacing) ** 2
+        self._reconstruct = _splashsurf()
+        # Lengths in radii; a particle's volume is not taken from its radius, but from the others.
+        self._options = {
+            "particle_radius": h, "smoothing_length": 1.0, "cube_size": self.spacing / h,
+            "iso_surface_threshold": level,
+            # Blocks of cubes are put together in an order of their own, of which sums are free.
+            "subdomain_grid": True, "subdomain_grid_auto_disable": False,
+            "mesh_smoothing_iters": round(smooth * steps) or None,
+            "compute_normals": True,
+            "normals_smoothing_iters": NORMAL_STEPS if smooth else None,
+        }  # fmt: skip
 
     def mesh(self) -> Mesh:
         """The surface as it is now.
@@ -117,10 +128,10 @@ class Surface:
         Returns:
             Points (p, 3) float32, triangles (t, 3) int32 whose front is outside, and the normals
             of the points (p, 3) float32. Empty where there are no particles. The same state gives
-            the same mesh, bit for bit; that of splashsurf may come in another order.
+            the same mesh, bit for bit.
 
         Raises:
-            ValueError: A position is not finite, or the grid would have too many nodes.
+            ValueError: A position is not finite, or particles are too far from each other.
         """
         x = self._get("position").astype(np.float64)
         if not len(x):
@@ -131,13 +142,23 @@ class Surface:
             first = int(np.argmax(bad))
             raise validate.fail(
                 "Surface.mesh", "position", "be finite [length]", x[first],
-                f"look at particle {int(self.rows[first])} of world {self.world.index}",
+                f"look at particle {int(self.rows[first])} of world {self.world}",
             )  # fmt: skip
-        return self.method.mesh(x, self._mass())
+        if np.ptp(x, axis=0).max() > FARTHEST * self.spacing:
+            raise validate.fail(
+                "Surface.mesh", "spacing",
+                f"be at least the fluid's extent over {FARTHEST} [length]", self.spacing,
+                "use a coarser spacing, or look for a particle that has flown off",
+            )  # fmt: skip
+        # Whole steps, so that nodes stay where they are from frame to frame.
+        origin = self.spacing * np.floor(x.min(axis=0) / self.spacing)
+        made, _ = self._reconstruct(x - origin, **self._options)
+        normals = made.point_attributes["normals"]
+        return _sorted(made.mesh.vertices + origin, made.mesh.triangles, normals)
 
     def _rows(self, group: Any) -> np.ndarray:
         """The group's particles as indices in the world's scene."""
-        scene = self.world.scene
+        scene = self.scene
         if group is None:
             fluids = self._fluids()
             return np.unique(np.concatenate(fluids)) if fluids else np.arange(scene.particle_count)
@@ -145,18 +166,25 @@ class Surface:
 
     def _fluids(self) -> list[np.ndarray]:
         """Members of each SPH of the world."""
-        return [select(self.world.scene, peer.group, "Surface") for peer in self._sph()]
+        return [select(self.scene, peer.group, "Surface") for peer in self._sph()]
 
     def _sph(self) -> list[SPH]:
-        index = self.world.index
-        return [each.peers[index] for each in self.sim.interactions if isinstance(each, SPH)]
+        return [each.peers[self.world] for each in self.sim.interactions if isinstance(each, SPH)]
 
     def _smoothing_length(self) -> float:
-        """That of the fluid which most of the particles belong to, or from their mean radius."""
+        """By the fluid which most of the particles belong to, or from their mean radius.
+
+        Wide smoothing functions are for the forces; drawn with them, fluids would have no edges.
+        """
         shared = [len(np.intersect1d(self.rows, members)) for members in self._fluids()]
         if max(shared, default=0) > 0:
-            return self._sph()[int(np.argmax(shared))].parameters["smoothing_length"]
-        radius = self.world.scene.radius[self.rows]
+            sph = self._sph()[int(np.argmax(shared))]
+            h, density = sph.parameters["smoothing_length"], sph.parameters.get("rest_density")
+            if density is None:
+                return h
+            volume = float(self.scene.mass[self.rows].mean()) / density
+            return min(h, SPACINGS * volume ** (1 / sph.dimension))
+        radius = self.scene.radius[self.rows]
         if not radius.any():
             if not len(self.rows):
                 return 1.0  # there will be no particle to draw
@@ -166,18 +194,12 @@ class Surface:
             )  # fmt: skip
         return 2.0 * SPACINGS * float(radius.mean())
 
-    def _mass(self) -> np.ndarray:
-        """Masses over their mean, to stay within float32."""
-        known = "mass" in self.sim.state
-        mass = self._get("mass") if known else self.world.scene.mass[self.rows]
-        return mass.astype(np.float64) / mass.mean()
-
     def _get(self, name: str) -> np.ndarray:
         """An array of the state for the group's particles."""
-        return self.sim.get(name)[self.world.rows][self.rows]
+        return self.sim.get(name)[self.sim.model.rows(self.world)][self.rows]
 
 
-def _in_scene(group: Any, scene: Scene, scenes: list[Scene]) -> Any:
+def _in_scene(group: Any, scene: Scene, scenes: Sequence[Scene]) -> Any:
     """The groups of that name in this world's scene; what is no group, as it is."""
     if isinstance(group, list | tuple):
         return [_in_scene(each, scene, scenes) for each in group]
@@ -186,3 +208,34 @@ def _in_scene(group: Any, scene: Scene, scenes: list[Scene]) -> Any:
     if isinstance(group, Group) and any(group.scene is each for each in scenes):
         return scene[group.name]
     return group
+
+
+def _splashsurf() -> Any:
+    """The library's whole way from particles to a mesh."""
+    try:
+        from pysplashsurf import reconstruction_pipeline
+    except ImportError:
+        raise ImportError(
+            "Surface: pysplashsurf must be installed, got none; pip install 'particlesim[surface]'."
+        ) from None
+    return reconstruction_pipeline
+
+
+def _sorted(points: np.ndarray, triangles: np.ndarray, normals: np.ndarray) -> Mesh:
+    """The mesh with points and triangles in order: threads leave them in any."""
+    order = np.lexsort(points.T)
+    place = np.empty(len(order), np.int32)
+    place[order] = np.arange(len(order), dtype=np.int32)
+    corners = place[triangles]
+    first = corners.argmin(axis=1)[:, None]
+    corners = np.take_along_axis(corners, (first + np.arange(3)) % 3, axis=1)
+    corners = corners[np.lexsort(corners.T)]
+    points, normals = points[order], normals[order]
+    bad = ~np.isfinite(normals).all(axis=1)
+    if bad.any():  # those of a bubble of one node may cancel: take one of its triangles'
+        a, b, c = points[corners].swapaxes(0, 1)
+        across = np.zeros_like(normals)
+        across[corners] = np.cross(b - a, c - a)[:, None]
+        length = np.linalg.norm(across[bad], axis=1, keepdims=True)
+        normals[bad] = across[bad] / np.maximum(length, np.finfo(float).tiny)
+    return points.astype(np.float32), corners, normals.astype(np.float32)

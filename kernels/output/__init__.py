@@ -1,1 +1,0 @@
-"""Kernels that prepare what is written: surfaces of fluids."""
