@@ -49,7 +49,7 @@ from .output.history.writer import History, read_history
 from .output.surface.surface import Surface
 from .output.usd.recorder import UsdRecorder
 from .pictures.render.camera import Camera
-from .scene import sample
+from .scene import __version__, sample
 from .scene.group import Group
 from .scene.law import Law, law
 from .scene.part import Interaction

@@ -16,7 +16,7 @@ from particlesim.engine.probing.spectrum import largest
 from particlesim.instruments.stability.check import StabilityWarning
 from particlesim.interactions.fluid.limits import steepest
 from particlesim.interactions.fluid.smoothing import SMOOTHING
-from particlesim.interactions.spring_limits import spring_bound
+from particlesim.interactions.springs import spring_bound
 
 SMALL = {
     "dam_break": {"spacing": 0.05},

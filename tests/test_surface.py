@@ -177,7 +177,7 @@ def fluid(x, h=RATIO, precision="float64"):
 
 
 def test_isotropic_surface_is_the_level_of_the_colour_field(precision):
-    """Against ``SPH.interpolate``: the sum of m / rho W, and the gradient by differences."""
+    """Against ``Simulation.interpolate``: the sum of m / rho W, and the gradient by differences."""
     x = lattice(6, 5, 4, jitter=0.3)
     sim, sph = fluid(x, precision=precision)
     surface = ps.Surface(sim, anisotropic=False)

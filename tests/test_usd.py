@@ -444,8 +444,8 @@ def test_killed_recording_can_be_read(tmp_path):
     script = """
 import sys
 import numpy as np
-from particlesim.usd.writer import UsdWriter
-from particlesim.usd.info import PointsPrim, StageInfo
+from particlesim.output.usd.writer import UsdWriter
+from particlesim.output.usd.info import PointsPrim, StageInfo
 
 count = 50_000
 drops = PointsPrim(0, "drops", slice(0, count), np.arange(count), 0.1, (1, 1, 1))

@@ -9,6 +9,7 @@ import pytest
 import warp as wp
 
 import particlesim as ps
+from particlesim.engine.frames import Frames
 from particlesim.engine.neighbors import verlet
 from particlesim.instruments.watchdog import audit
 from particlesim.instruments.watchdog.watch import Watchdog
@@ -81,7 +82,9 @@ def alarms(monkeypatch):
     seen = []
     attend = Watchdog.attend
     monkeypatch.setattr(
-        Watchdog, "attend", lambda self, sim: seen.append(sim.frame) or attend(self, sim)
+        Watchdog,
+        "attend",
+        lambda self, frames: seen.append(frames.loop.frame) or attend(self, frames),
     )
     return seen
 
@@ -543,10 +546,10 @@ def test_ready_scenes_raise_no_alarm(name, device, alarms):
 
 def test_an_audit_costs_three_refinements(device, monkeypatch):
     done = []
-    peaks = ps.simulation.Frames.peaks
+    peaks = Frames.peaks
     monkeypatch.setattr(
-        ps.simulation.Frames, "peaks",
-        lambda self, sim, substeps: done.append(substeps) or peaks(self, sim, substeps),
+        Frames, "peaks",
+        lambda self, substeps: done.append(substeps) or peaks(self, substeps),
     )  # fmt: skip
     scene, settings = falling()
     sim = ps.Simulation(scene, settings.replace(energy_growth=1.5), device=device)

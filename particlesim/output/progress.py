@@ -28,7 +28,7 @@ class Meter:
             TimeRemainingColumn,
         )
 
-        self.label, self.frames, self.particles = label, frames, sim.model.particle_count
+        self.label, self.frames, self.particles = label, frames, sim.particle_count
         self.work = self.particles * sim.settings.substeps
         columns = [
             TextColumn("{task.description}", markup=False),
