@@ -11,6 +11,7 @@ from .constraints.constraint import Constraint
 from .constraints.contact import Contact
 from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
+from .engine.integrators import Integrator
 from .instruments.ledger.ledger import Ledger
 from .instruments.stability.check import StabilityWarning
 from .instruments.stability.report import Stability
@@ -36,7 +37,6 @@ from .scene.settings import Settings
 from .simulation.simulation import Simulation
 
 __all__ = [
-    "__version__",
     "SPH",
     "ArtificialViscosity",
     "BoxBoundary",
@@ -51,6 +51,7 @@ __all__ = [
     "Group",
     "History",
     "Incident",
+    "Integrator",
     "Interaction",
     "Law",
     "Ledger",
@@ -76,6 +77,7 @@ __all__ = [
     "Tuned",
     "UniformGravity",
     "UsdRecorder",
+    "__version__",
     "law",
     "read_history",
     "sample",

@@ -28,7 +28,7 @@ from ..instruments.watchdog.watch import Watchdog
 from ..scene import __version__
 from ..scene.fingerprint import difference, fingerprint
 from ..scene.scene import Scene
-from ..scene.settings import Settings
+from ..scene.settings import INTEGRATORS, Settings
 from . import files
 
 FORMAT, VERSION = "particlesim checkpoint", 1
@@ -73,7 +73,7 @@ def capture(
         "unknown_forces": sorted(loop.unknown_forces),
         "frozen": sorted(watchdog.frozen),
         "incidents": [dataclasses.asdict(incident) for incident in watchdog.incidents],
-        "settings": dataclasses.asdict(loop.settings),
+        "settings": loop.settings.plain,
         "copies": all(scene is loop.scenes[0] for scene in loop.scenes),
         "scenes": fingerprint(loop.scenes) if scenes is None else scenes,
         "arrays": list(arrays),
@@ -137,13 +137,22 @@ def _settings(source: Path, saved: dict[str, Any], given: Settings | None) -> Se
     known = {field.name for field in dataclasses.fields(Settings)}
     if not known >= saved.keys():
         raise _unfit(source, f"has the unknown knobs {sorted(saved.keys() - known)}")
-    settings = Settings(**saved)
-    if given is None:
-        return settings
-    if not isinstance(given, Settings):
+    if given is not None and not isinstance(given, Settings):
         raise TypeError(
             f"Simulation.load: settings must be a Settings, got {given!r}; use Settings(...)."
         )
+    method = None if given is None else given.integrator
+    if isinstance(method, type) and method.__name__ == saved["integrator"]:
+        saved = {**saved, "integrator": method}
+    elif saved["integrator"] not in INTEGRATORS:
+        raise validate.fail(
+            "Simulation.load", "settings.integrator",
+            f"be the {saved['integrator']} of {source.name!r}", method,
+            "give settings with that class",
+        )  # fmt: skip
+    settings = Settings(**saved)
+    if given is None:
+        return settings
     if given.automatic:
         given = given.replace(dt=settings.dt, substeps=settings.substeps)
     for name in FIXED:
