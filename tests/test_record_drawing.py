@@ -7,7 +7,7 @@ from pxr import Sdf, Usd, UsdGeom
 
 import particlesim as ps
 from particlesim.output.colors import colored
-from particlesim.output.usd_tools import check
+from particlesim.output.usd.checking.check import check
 
 
 def opened(path):

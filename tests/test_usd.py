@@ -14,8 +14,8 @@ import pytest
 import warp as wp
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdValidation, Vt
 
-from particlesim.output.usd.info import LinksPrim, PointsPrim, Shape, StageInfo
-from particlesim.output.usd.writer import UsdWriter
+from particlesim.output.usd.description import LinksPrim, PointsPrim, Shape, StageInfo
+from particlesim.output.usd.writing.writer import UsdWriter
 
 BLUE, RED = (0.2, 0.5, 0.9), (0.9, 0.2, 0.1)
 # Blender drops, without a word, every primvar after one of another type.
@@ -444,8 +444,8 @@ def test_killed_recording_can_be_read(tmp_path):
     script = """
 import sys
 import numpy as np
-from particlesim.usd.writer import UsdWriter
-from particlesim.usd.info import PointsPrim, StageInfo
+from particlesim.output.usd.writing.writer import UsdWriter
+from particlesim.output.usd.description import PointsPrim, StageInfo
 
 count = 50_000
 drops = PointsPrim(0, "drops", slice(0, count), np.arange(count), 0.1, (1, 1, 1))

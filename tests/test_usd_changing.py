@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
-from particlesim.output.usd.frame import vertex_normals
-from particlesim.output.usd.info import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
+from particlesim.output.usd.checking.check import check
+from particlesim.output.usd.description import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
 from particlesim.output.usd.shapes import Shape as SameShape
-from particlesim.output.usd.writer import UsdWriter
-from particlesim.output.usd_tools import check
+from particlesim.output.usd.writing.frame import vertex_normals
+from particlesim.output.usd.writing.writer import UsdWriter
 
 BLUE, RED = (0.2, 0.5, 0.9), (0.9, 0.2, 0.1)
 COUNT = 12

@@ -10,8 +10,10 @@ from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 import particlesim as ps
 from particlesim import cli
 from particlesim.commands.scene_files import load_scene, ready_scenes
-from particlesim.output.usd_tools import check, info, pack
-from particlesim.output.usd_tools.fault import Fault
+from particlesim.output.usd.checking.check import check
+from particlesim.output.usd.checking.fault import Fault
+from particlesim.output.usd.info import info
+from particlesim.output.usd.pack import pack
 
 FRAMES, COUNT = 5, 12  # the start state is one frame more
 PLANT = 3  # the frame in which faults are planted

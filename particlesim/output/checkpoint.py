@@ -47,7 +47,7 @@ class Capture:
 
 def save(frames: Frames, watchdog: Watchdog, path: str | os.PathLike[str], overwrite: bool) -> None:
     """Write the present (see :meth:`Simulation.save`)."""
-    target = _writable(path, overwrite)
+    target = files.check_new("Simulation.save", path, overwrite, suffixes=(".npz",))
     _publish(target, capture(frames, watchdog))
 
 
@@ -188,30 +188,6 @@ def _unfit(source: Path, how: str) -> ValueError:
 
 
 # The file ------------------------------------------------------------------------------------
-
-
-def _writable(path: str | os.PathLike[str], overwrite: bool) -> Path:
-    """``path``, checked before any work is done for it."""
-    owner, target = "Simulation.save", Path(path)
-    if target.suffix != ".npz":
-        raise validate.fail(
-            owner, "path", "end in .npz", str(target), f"name it {target.with_suffix('.npz').name}"
-        )
-    if not target.parent.is_dir():
-        raise FileNotFoundError(
-            f"{owner}: path must be in an existing folder, got {str(target)!r}; "
-            f"make {str(target.parent)!r} first."
-        )
-    if target.is_dir():
-        raise IsADirectoryError(
-            f"{owner}: path must be a file, got the folder {str(target)!r}; choose another name."
-        )
-    if target.exists() and not overwrite:
-        raise FileExistsError(
-            f"{owner}: path must be new, got {str(target)!r}, which exists; choose another, or "
-            "pass overwrite=True."
-        )
-    return target
 
 
 def _publish(target: Path, capture: Capture) -> None:

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ... import validate
 from .. import files
-from .base import ParticleFrame, ParticleRecorder
+from .base import KEPT, ParticleFrame, ParticleRecorder
 from .gsd_layout import Extent, cut, last_frame
 
-KEPT = "Frames written before are kept."
 ARRAYS = 16  # at most, of the schema's own in a frame
 # What the schema has a place for; all else are logged quantities.
 KNOWN = {"position": "position", "velocity": "velocity", "group": "typeid"}
@@ -36,7 +36,7 @@ class GsdRecorder(ParticleRecorder):
     suffix = ".gsd"
 
     def __init__(self, *arguments: Any, **options: Any):
-        self._library = _gsd()
+        self._library = validate.installed(self.__class__.__name__, "gsd.hoomd", "gsd")
         self._open: Any = None
         self._first = 0
         super().__init__(*arguments, **options)
@@ -71,10 +71,7 @@ class GsdRecorder(ParticleRecorder):
                 self._detach()
             before.restore(self.path)
             cut(self.path, place)
-            raise OSError(
-                f"{self.owner}: {str(self.path)!r} must be writable, got {error}; free some space "
-                f"or choose another folder. {KEPT}"
-            ) from error
+            raise files.unwritable(self.owner, self.path, error, KEPT) from error
 
     def _go_on(self, last: int) -> None:
         if not self.path.is_file():
@@ -143,14 +140,3 @@ class GsdRecorder(ParticleRecorder):
         length = self.sim.model.box_length.max(axis=0) if self.sim.model.periodic else np.zeros(3)
         reached = np.where(reach > 0, 2.0 * reach, 1.0)
         return [*np.where(length > 0, length, reached).tolist(), 0.0, 0.0, 0.0]
-
-
-def _gsd() -> Any:
-    try:
-        import gsd.hoomd
-    except ImportError:
-        raise ImportError(
-            "GsdRecorder: gsd must be installed, got no such package; "
-            "pip install 'particlesim[gsd]'."
-        ) from None
-    return gsd.hoomd

@@ -1,211 +1,163 @@
-"""What the clips of a USD recording hold: the values that change, frame by frame.
+"""Value clips: a file a frame, how a root layer tells of them, and how that is read.
 
-The same attributes are declared in the root and in the manifest, without a default, for a default
-in the root would hide the clips.
+Beside ``out.usda`` there are ``out.clips/manifest.usda``, which declares what clips hold, and
+``out.clips/f.######.usdc``, a frame each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Sdf, Tf, Vt
+from pxr import Sdf, Tf, Usd
 
-from .frame import KINDS, Frame, Surface, primvar
-from .geometry import extent
-from .info import LinksPrim, MeshPrim, PointsPrim, StageInfo
-from .prims import Types, author, floats, integers, matrix, vectors
+from .layout import WORLD
 
-WORLD = Sdf.Path("/World")
-# Names that a world's room has for other things than its groups.
-RESERVED = ("boundaries", "periodic_box")
-Fields = Mapping[str, int | str]
+MANIFEST = "manifest.usda"
+
+
+def clip_folder(root: Path) -> Path:
+    """Where the clips of a recording are."""
+    return root.with_suffix(".clips")
+
+
+def clip_file(folder: Path, frame: int) -> Path:
+    """The file of a frame."""
+    return folder / f"f.{frame:06d}.usdc"
+
+
+def stale_files(folder: Path) -> list[Path]:
+    """The files of an earlier recording, and what a kill left of them."""
+    return [*folder.glob("f.*.usdc"), *folder.glob("manifest.*usda")]
+
+
+def set_frames(root: Sdf.Layer, folder: str, first: int, last: int) -> None:
+    """Tell the root its first and last frame, and where the clips of them are."""
+    root.startTimeCode, root.endTimeCode = first, last
+    clip_set = {
+        "primPath": str(WORLD),
+        "manifestAssetPath": Sdf.AssetPath(f"./{folder}/{MANIFEST}"),
+        "templateAssetPath": f"./{folder}/f.######.usdc",
+        "templateStartTime": float(first),
+        "templateEndTime": float(last),
+        "templateStride": 1.0,
+    }
+    root.GetPrimAtPath(WORLD).SetInfo("clips", {"default": clip_set})
 
 
 @dataclass(frozen=True)
-class Layout:
-    """Prim paths, in the order of the description."""
+class Clip:
+    """One file of a clip set: what it holds is seen from stage time ``frame`` to ``until``.
 
-    points: list[Sdf.Path]
-    links: list[Sdf.Path]
-    meshes: list[Sdf.Path]
-    shapes: list[Sdf.Path]
+    ``time`` is the time code inside the file.
+    """
 
+    frame: float
+    until: float
+    time: float
+    path: Path
 
-def room(world: int) -> Sdf.Path:
-    """The prim of a world."""
-    return WORLD.AppendChild(f"env_{world:04d}")
-
-
-def layout(info: StageInfo) -> Layout:
-    """Where every prim goes: names made valid, and unique within their world."""
-    taken: set[Sdf.Path] = set()
-
-    def place(world: int, name: str, below: str = "") -> Sdf.Path:
-        taken.update(room(world).AppendChild(name) for name in RESERVED)
-        parent = room(world).AppendChild(below) if below else room(world)
-        base = Tf.MakeValidIdentifier(name)
-        path, number = parent.AppendChild(base), 1
-        while path in taken:
-            number += 1
-            path = parent.AppendChild(f"{base}_{number}")
-        taken.add(path)
-        return path
-
-    return Layout(
-        [place(prim.world, prim.name) for prim in info.points],
-        [place(prim.world, prim.name) for prim in info.links],
-        [place(prim.world, prim.name) for prim in info.meshes],
-        [place(shape.world, shape.name, "boundaries") for shape in info.shapes],
-    )
+    @property
+    def exists(self) -> bool:
+        """Whether its file is there."""
+        return self.path.is_file()
 
 
-def manifest(paths: Layout, fields: Fields, info: StageInfo) -> Sdf.Layer:
-    """A layer that declares what clips hold: the manifest, and the mould of every clip."""
-    layer = Sdf.Layer.CreateAnonymous(".usda")
-    layer.timeCodesPerSecond = layer.framesPerSecond = info.fps
-    with Sdf.ChangeBlock():
-        for prim, path in zip(info.points, paths.points, strict=True):
-            declare_points(Sdf.CreatePrimInLayer(layer, path), prim, fields)
-        for links, path in zip(info.links, paths.links, strict=True):
-            declare_links(Sdf.CreatePrimInLayer(layer, path), links)
-        for mesh, path in zip(info.meshes, paths.meshes, strict=True):
-            declare_mesh(Sdf.CreatePrimInLayer(layer, path), mesh, fields)
-        for shape, path in zip(info.shapes, paths.shapes, strict=True):
-            if shape.moving:
-                author(Sdf.CreatePrimInLayer(layer, path), "xformOp:transform", Types.Matrix4d)
-    return layer
+@dataclass(frozen=True)
+class ClipSet:
+    """The value clips of one prim; ``inside`` is the path that its prim has in the clip files."""
+
+    prim: Sdf.Path
+    inside: Sdf.Path
+    manifest: Path | None
+    clips: tuple[Clip, ...]
+
+    def outside(self, path: Sdf.Path) -> Sdf.Path:
+        """Path on the stage of what has ``path`` in a clip."""
+        return path.ReplacePrefix(self.inside, self.prim)
+
+    def declared(self, layer: Sdf.Layer) -> set[Sdf.Path]:
+        """Paths of the attributes of a layer that belong to the set."""
+        found: set[Sdf.Path] = set()
+
+        def note(path: Sdf.Path) -> None:
+            if path.IsPropertyPath() and layer.GetAttributeAtPath(path):
+                found.add(path)
+
+        if layer.GetPrimAtPath(self.inside):
+            layer.Traverse(self.inside, note)
+        return found
 
 
-def declare_points(spec: Sdf.PrimSpec, prim: PointsPrim, fields: Fields) -> None:
-    """What clips hold of a group."""
-    author(spec, "positions" if prim.instancer else "points", Types.Point3fArray)
-    author(spec, "velocities", Types.Vector3fArray)
-    author(spec, "extent", Types.Float3Array)
-    if prim.indices is None:
-        author(spec, "ids", Types.Int64Array)
-        author(spec, "primvars:pid", Types.IntArray, interpolation="vertex")
-        if prim.instancer:
-            author(spec, "protoIndices", Types.IntArray)
-    if "widths" in fields:
-        if prim.instancer:
-            author(spec, "scales", Types.Float3Array)
-        else:
-            author(spec, "widths", Types.FloatArray, interpolation="vertex")
-    _declare_fields(spec, fields)
+def opened(path: Path) -> Sdf.Layer | None:
+    """The layer of a file; None: it cannot be read."""
+    try:
+        return Sdf.Layer.FindOrOpen(str(path))
+    except Tf.ErrorException:
+        return None
 
 
-def declare_links(spec: Sdf.PrimSpec, prim: LinksPrim) -> None:
-    """What clips hold of links."""
-    author(spec, "points", Types.Point3fArray)
-    author(spec, "extent", Types.Float3Array)
-    if prim.pairs is None:
-        author(spec, "curveVertexCounts", Types.IntArray)
-
-
-def declare_mesh(spec: Sdf.PrimSpec, prim: MeshPrim, fields: Fields) -> None:
-    """What clips hold of a surface."""
-    author(spec, "points", Types.Point3fArray)
-    author(spec, "normals", Types.Normal3fArray, interpolation="vertex")
-    author(spec, "extent", Types.Float3Array)
-    if prim.triangles is None:
-        author(spec, "faceVertexCounts", Types.IntArray)
-        author(spec, "faceVertexIndices", Types.IntArray)
-    else:
-        author(spec, "velocities", Types.Vector3fArray)
-        _declare_fields(spec, fields)
-
-
-def _declare_fields(spec: Sdf.PrimSpec, fields: Fields) -> None:
-    for name, kind in fields.items():
-        if name != "widths":
-            author(spec, f"primvars:{primvar(name)}", KINDS[kind], interpolation="vertex")
-
-
-def fill_clip(clip: Sdf.Layer, paths: Layout, info: StageInfo, frame: Frame) -> None:
-    """Put one frame into the clip's layer, instead of the one before."""
-
-    def put(path: Sdf.Path, values: Iterator[tuple[str, Any]]) -> None:
-        for name, value in values:
-            at = path.AppendProperty(name)
-            clip.EraseTimeSample(at, frame.number - 1)
-            clip.SetTimeSample(at, frame.number, value)
-
-    with Sdf.ChangeBlock():
-        clip.customLayerData = {"particlesim": frame.notes} if frame.notes else {}
-        for prim, path, (rows, ids) in zip(info.points, paths.points, frame.clouds, strict=True):
-            put(path, _points(prim, frame, rows, ids))
-        for links, path, pairs in zip(info.links, paths.links, frame.pairs, strict=True):
-            put(path, _links(links, info, frame.x, pairs))
-        for path, surface in zip(paths.meshes, frame.surfaces, strict=True):
-            put(path, _mesh(frame, surface))
-        for path, pose in zip(paths.shapes, frame.poses, strict=True):
-            if pose is not None:
-                put(path, iter([("xformOp:transform", matrix(pose))]))
-
-
-def _points(
-    prim: PointsPrim, frame: Frame, rows: Any, ids: np.ndarray | None
-) -> Iterator[tuple[str, Any]]:
-    x, widths = frame.x[rows], frame.widths(prim, rows)
-    yield "positions" if prim.instancer else "points", vectors(x)
-    yield "velocities", vectors(frame.v[rows])
-    yield "extent", vectors(extent(x, widths))
-    if ids is not None:
-        yield "ids", Vt.Int64Array.FromNumpy(ids)
-        yield "primvars:pid", integers(ids)
-        if prim.instancer:
-            yield "protoIndices", integers(np.zeros(len(ids)))
-    if "widths" in frame.fields:
-        if prim.instancer:
-            yield "scales", vectors(np.repeat(np.asarray(widths)[:, None], 3, axis=1))
-        else:
-            yield "widths", floats(widths)
-    yield from _fields(frame, rows)
-
-
-def _links(
-    prim: LinksPrim, info: StageInfo, x: np.ndarray, pairs: np.ndarray
-) -> Iterator[tuple[str, Any]]:
-    points = _segments(pairs, info, x)
-    yield "points", vectors(points)
-    yield "extent", vectors(extent(points, prim.width))
-    if prim.pairs is None:
-        yield "curveVertexCounts", integers(np.full(len(pairs), 2))
-
-
-def _segments(pairs: np.ndarray, info: StageInfo, x: np.ndarray) -> np.ndarray:
-    """Ends of the links, (2 m, 3); in a periodic box the second is its image next to the first."""
-    ends = x[pairs]
-    if info.periodic is not None:
-        size = info.periodic[1] - info.periodic[0]
-        around = ~np.isnan(size)
-        apart = (ends[:, 1] - ends[:, 0])[:, around]
-        ends[:, 1, around] -= np.round(apart / size[around]) * size[around]
-    return ends.reshape(-1, 3)
-
-
-def _mesh(frame: Frame, surface: Surface) -> Iterator[tuple[str, Any]]:
-    yield "points", vectors(surface.points)
-    yield "normals", vectors(surface.normals)
-    yield "extent", vectors(extent(surface.points, None))
-    if surface.triangles is not None:
-        yield "faceVertexCounts", integers(np.full(len(surface.triangles), 3))
-        yield "faceVertexIndices", integers(surface.triangles)
-    if surface.velocities is not None:
-        yield "velocities", vectors(surface.velocities)
-        yield from _fields(frame, surface.rows)
-
-
-def _fields(frame: Frame, rows: Any) -> Iterator[tuple[str, Any]]:
-    for name, values in frame.fields.items():
-        if name == "widths":
+def clip_sets(prims: Iterator[Usd.Prim]) -> list[ClipSet]:
+    """All clip sets of these prims."""
+    found = []
+    for prim in prims:
+        if not prim.HasAuthoredMetadata("clips"):
             continue
-        if values.ndim == 2:
-            yield f"primvars:{name}", vectors(values[rows])
-        elif np.issubdtype(values.dtype, np.integer):
-            yield f"primvars:{name}", integers(values[rows])
-        else:
-            yield f"primvars:{name}", floats(values[rows])
+        layer = next(spec.layer for spec in prim.GetPrimStack() if spec.HasInfo("clips"))
+        for described in Usd.ClipsAPI(prim).GetClips().values():
+            if isinstance(described, dict):
+                manifest = described.get("manifestAssetPath")
+                found.append(
+                    ClipSet(
+                        prim.GetPath(),
+                        Sdf.Path(described.get("primPath", str(prim.GetPath()))),
+                        _anchored(layer, manifest.path) if manifest and manifest.path else None,
+                        tuple(_templated(layer, described) or _listed(layer, described)),
+                    )
+                )
+    return found
+
+
+def _anchored(layer: Sdf.Layer, path: str) -> Path:
+    return Path(layer.ComputeAbsolutePath(path))
+
+
+def _templated(layer: Sdf.Layer, described: dict[str, Any]) -> list[Clip]:
+    """Clips named by number: one a stride, from start to end."""
+    pattern = described.get("templateAssetPath", "")
+    start, end, stride = (
+        float(described.get(f"template{name}", 0.0)) for name in ("StartTime", "EndTime", "Stride")
+    )
+    digits = re.search(r"(#+)(?:\.(#+))?(?!.*#)", pattern)
+    if digits is None or stride <= 0:
+        return []
+    clips = []
+    for frame in start + stride * np.arange(int((end - start) / stride + 1e-6) + 1):
+        number = f"{int(frame):0{len(digits[1])}d}"
+        if digits[2]:
+            number = f"{frame:0{len(digits[1]) + 1 + len(digits[2])}.{len(digits[2])}f}"
+        name = pattern[: digits.start()] + number + pattern[digits.end() :]
+        clips.append(Clip(frame, frame + stride, frame, _anchored(layer, name)))
+    return clips
+
+
+def _listed(layer: Sdf.Layer, described: dict[str, Any]) -> list[Clip]:
+    """Clips that are named one by one."""
+    paths = [_anchored(layer, asset.path) for asset in described.get("assetPaths", ())]
+    active = sorted((float(t), int(k)) for t, k in described.get("active", ()))
+    times = np.array(described.get("times", ()), dtype=float).reshape(-1, 2)
+    starts = [t for t, _ in active] + [float("inf")]
+    return [
+        Clip(
+            frame,
+            until,
+            float(np.interp(frame, times[:, 0], times[:, 1])) if len(times) else frame,
+            paths[k],
+        )
+        for (frame, k), until in zip(active, starts[1:], strict=True)
+        if 0 <= k < len(paths)
+    ]

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from pxr import Tf, Usd, UsdGeom
+from pxr import Usd, UsdGeom
 
-from .clips import type_fault
+from .clip_files import type_fault
 from .fault import Fault
 
 # What Blender 5.0 reads as an attribute, measured type by type. From points it drops, without a
@@ -19,17 +19,6 @@ READABLE = frozenset(
 )
 # USD itself has these in half precision.
 HALVES = frozenset({"orientations"})
-
-
-def read(attribute: Usd.Attribute, frame: float | Usd.TimeCode) -> Any:
-    """The value at a frame; arrays of numbers as NumPy's, without a copy. None: there is none."""
-    try:
-        value = attribute.Get(frame)
-    except Tf.ErrorException:  # a file that cannot be read: reported with the clips
-        return None
-    if hasattr(value, "__array_interface__") or hasattr(type(value), "FromNumpy"):
-        return np.asarray(value)
-    return value
 
 
 def value_faults(attribute: Usd.Attribute, value: Any, frame: float | None) -> Iterator[Fault]:

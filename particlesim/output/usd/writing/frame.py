@@ -9,10 +9,17 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Tf
 
-from ... import validate
-from .info import LinksPrim, MeshPrim, PointsPrim, StageInfo, particle_ids, row_indices
-from .info import row_pairs as checked_pairs
-from .shapes import Shape
+from .... import validate
+from ..description import (
+    LinksPrim,
+    MeshPrim,
+    PointsPrim,
+    Shape,
+    StageInfo,
+    particle_ids,
+    row_indices,
+)
+from ..description import row_pairs as checked_pairs
 
 OWNER = "UsdRecorder.write"
 KINDS: dict[int | str, Sdf.ValueTypeName] = {

@@ -1,6 +1,6 @@
 """Checks of what is drawn: lengths of arrays, indices, and extents, at one frame.
 
-``values`` are a prim's attributes by name, as :func:`particlesim.output.usd_tools.values.read` gives them.
+``values`` are a prim's attributes by name, as ``recording.read`` gives them.
 """
 
 from __future__ import annotations

@@ -20,7 +20,8 @@ from collections.abc import Iterable
 import numpy as np
 from pxr import Sdf, Vt
 
-from .clips import WORLD, Fields, Layout, declare_links, declare_mesh, declare_points, room
+from ..description import Color, LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
+from ..layout import PERIODIC_BOX, WORLD, Layout, room
 from .frame import Frame
 from .geometry import (
     CORNERS,
@@ -34,7 +35,6 @@ from .geometry import (
     viewpoint,
     world_boxes,
 )
-from .info import Color, LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
 from .look import CLEAR, Materials, author_camera, author_lights
 from .prims import (
     Types,
@@ -51,6 +51,7 @@ from .prims import (
     surface,
     vectors,
 )
+from .samples import Fields, declare_links, declare_mesh, declare_points
 
 BALL_CUTS = 6  # of a cube's side that becomes an instanced sphere: 216 quads
 
@@ -71,20 +72,6 @@ def sized(info: StageInfo, clouds: Iterable[np.ndarray]) -> StageInfo:
         for prim in info.points
     ]
     return dataclasses.replace(info, points=points)
-
-
-def set_frames(root: Sdf.Layer, clips: str, first: int, last: int) -> None:
-    """Tell the root its first and last frame, and where the clips of them are."""
-    root.startTimeCode, root.endTimeCode = first, last
-    clip_set = {
-        "primPath": str(WORLD),
-        "manifestAssetPath": Sdf.AssetPath(f"./{clips}/manifest.usda"),
-        "templateAssetPath": f"./{clips}/f.######.usdc",
-        "templateStartTime": float(first),
-        "templateEndTime": float(last),
-        "templateStride": 1.0,
-    }
-    root.GetPrimAtPath(WORLD).SetInfo("clips", {"default": clip_set})
 
 
 def author_root(paths: Layout, info: StageInfo, fields: Fields, frame: Frame) -> Sdf.Layer:
@@ -192,7 +179,7 @@ class _Root:
             places = {room(world): box for world, box in self.boxes.items()}
         for parent, seen in places.items():
             box = np.where(np.isnan(self.info.periodic), seen, self.info.periodic)
-            self.outline(parent.AppendChild("periodic_box"), box, (0.5, 0.5, 0.5))
+            self.outline(parent.AppendChild(PERIODIC_BOX), box, (0.5, 0.5, 0.5))
 
     def shape(self, shape: Shape, path: Sdf.Path, pose: np.ndarray | None) -> None:
         first, second = shape.parameters

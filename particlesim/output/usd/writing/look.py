@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from pxr import Gf, Sdf, Tf, Vt
 
-from .clips import WORLD
+from ..description import Color
+from ..layout import WORLD
 from .geometry import APERTURE, FOCAL_LENGTH, VIEW, pose_of
 from .prims import Types, author, define, floats, place, relate
-from .shapes import Color
 
 CLEAR = 0.1  # opacity of what particles are inside of
 

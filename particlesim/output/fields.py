@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ... import validate
-from ...engine.source import Source
-from ...interactions.fluid.sph import SPH
-from .. import colors
+from .. import validate
+from ..engine.source import Source
+from ..interactions.fluid.sph import SPH
+from . import colors
 
 OWNER = "UsdRecorder"
 DERIVED = ("speed",)

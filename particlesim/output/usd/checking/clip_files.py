@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from pxr import Sdf, Tf, Usd
+from pxr import Sdf, Usd
 
+from ..clips import Clip, ClipSet, opened
+from ..recording import CLIPS, Recording
 from .fault import Fault
-from .recording import CLIPS, Clip, ClipSet, Recording
 
 AGAIN = "record it again, or go on from the last checkpoint before"
 
@@ -30,13 +31,13 @@ def clip_set_faults(recording: Recording, clip_set: ClipSet) -> Iterator[Fault]:
         where = _relative(clip_set.manifest, folder)
         yield Fault("manifest", prim, "clips", None, f"read {where}", "an error", AGAIN)
         return
-    for path in sorted(declared(manifest, clip_set)):
+    for path in sorted(clip_set.declared(manifest)):
         yield from _manifest_faults(recording.stage, manifest, path, clip_set)
 
 
 def _gap_faults(clip_set: ClipSet, folder: Path) -> Iterator[Fault]:
-    missing = [clip for clip in clip_set.clips if not clip.path.is_file()]
-    present = [clip.frame for clip in clip_set.clips if clip.path.is_file()]
+    missing = [clip for clip in clip_set.clips if not clip.exists]
+    present = [clip.frame for clip in clip_set.clips if clip.exists]
     last = max(present, default=float("-inf"))
     for clip in missing:
         name = _relative(clip.path, folder)
@@ -84,8 +85,8 @@ def clip_faults(recording: Recording, clip_set: ClipSet, clip: Clip) -> Iterator
     manifest = opened(clip_set.manifest) if clip_set.manifest else None
     if manifest is None:
         return
-    expected = declared(manifest, clip_set)
-    for path in sorted(declared(layer, clip_set) - expected):
+    expected = clip_set.declared(manifest)
+    for path in sorted(clip_set.declared(layer) - expected):
         at = clip_set.outside(path)
         condition, remedy = "be in the manifest", "declare it there: readers skip it"
         yield Fault(
@@ -119,27 +120,6 @@ def type_fault(prim: str, name: str, frame: float | None, held: str, wanted: str
     """A value of another type than its attribute; half precision has a kind of its own."""
     kind = "half" if "half" in held or "quath" in held else "type"
     return Fault(kind, prim, name, frame, f"hold {wanted}", held, f"write {wanted}")
-
-
-def declared(layer: Sdf.Layer, clip_set: ClipSet) -> set[Sdf.Path]:
-    """Paths of the attributes of a layer that belong to the clip set."""
-    found: set[Sdf.Path] = set()
-
-    def note(path: Sdf.Path) -> None:
-        if path.IsPropertyPath() and layer.GetAttributeAtPath(path):
-            found.add(path)
-
-    if layer.GetPrimAtPath(clip_set.inside):
-        layer.Traverse(clip_set.inside, note)
-    return found
-
-
-def opened(path: Path) -> Sdf.Layer | None:
-    """The layer of a file; None: it cannot be read."""
-    try:
-        return Sdf.Layer.FindOrOpen(str(path))
-    except Tf.ErrorException:
-        return None
 
 
 def _relative(path: Path, folder: Path) -> str:

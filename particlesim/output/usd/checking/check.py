@@ -7,11 +7,12 @@ from collections.abc import Iterator, Sequence
 
 from pxr import Tf, Usd, UsdGeom, UsdValidation
 
-from .clips import clip_faults, clip_set_faults
+from ..clips import ClipSet
+from ..recording import CLIPS, Recording, notes, prims, quiet, read
+from .clip_files import clip_faults, clip_set_faults
 from .fault import Fault, collapsed
 from .gprims import gprim_faults
-from .recording import CLIPS, ClipSet, Recording, prims, quiet
-from .values import primvar_faults, read, value_faults
+from .values import primvar_faults, value_faults
 
 REMEDIES = {
     "MissingDefaultPrim": "set it to the prim that holds all others",
@@ -48,13 +49,21 @@ def check(path: str | os.PathLike[str]) -> list[Fault]:
         []
     """
     with quiet():
-        recording = Recording("usd_tools.check", path)
+        recording = Recording("usd.check", path)
         return collapsed(_faults(recording))
 
 
 def _faults(recording: Recording) -> Iterator[Fault]:
-    for clip_set in recording.clip_sets:
-        yield from clip_set_faults(recording, clip_set)
+    found = [fault for each in recording.clip_sets for fault in clip_set_faults(recording, each)]
+    yield from found
+    # Without its manifest nothing can be read of a clip.
+    if not any(fault.kind == "manifest" for fault in found):
+        yield from _own_faults(recording)
+    yield from _validator_faults(recording.stage)
+
+
+def _own_faults(recording: Recording) -> Iterator[Fault]:
+    """What the validators do not look at: rates, times, and the values of every frame."""
     frames = recording.frames()
     yield from _stage_faults(recording.stage, frames)
     for prim in prims(recording.stage):
@@ -65,7 +74,6 @@ def _faults(recording: Recording) -> Iterator[Fault]:
         frames or [0.0],
         lambda stage, some: list(_frame_faults(recording, stage, some, some[0] == first)),
     )
-    yield from _validator_faults(recording.stage)
 
 
 def _frame_faults(
@@ -75,7 +83,7 @@ def _frame_faults(
     broken = set()
     for clip_set in recording.clip_sets:
         for clip in clip_set.clips:
-            if clip.frame in frames and clip.path.is_file():
+            if clip.frame in frames and clip.exists:
                 found = list(clip_faults(recording, clip_set, clip))
                 broken |= {each.frame for each in found if each.kind == "unreadable"}
                 yield from found
@@ -90,7 +98,7 @@ def _stage_faults(stage: Usd.Stage, frames: Sequence[float]) -> Iterator[Fault]:
     if rate <= 0 or rate != shown:
         text = (f"be framesPerSecond, {shown:g}", f"{rate:g}", "set both to the frames a second")
         yield Fault("fps", "/", "timeCodesPerSecond", None, *text)
-    made = stage.GetRootLayer().customLayerData.get("particlesim", {}).get("fps", rate)
+    made = notes(stage).get("fps", rate)
     if made != rate:
         text = (f"be {made:g}, as recorded", f"{rate:g}", "set it back, framesPerSecond too")
         yield Fault("fps", "/", "timeCodesPerSecond", None, *text)
@@ -137,7 +145,7 @@ def _times(attribute: Usd.Attribute, clip_sets: Sequence[ClipSet]) -> set[float]
     # Nearest above, as values come from it.
     above = [each for each in clip_sets if attribute.GetPath().HasPrefix(each.prim)]
     nearest = max(above, key=lambda each: each.prim.pathElementCount)
-    return {clip.frame for clip in nearest.clips if clip.path.is_file()}
+    return {clip.frame for clip in nearest.clips if clip.exists}
 
 
 def _prim_faults(

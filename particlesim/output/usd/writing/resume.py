@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Tf
 
-from ... import validate
-from . import stage
-from .clips import Fields, Layout, manifest
-from .info import StageInfo
+from .... import validate
+from ..clips import MANIFEST, clip_file
+from ..description import StageInfo
+from ..layout import Layout
+from .root import sized
+from .samples import Fields, manifest
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,16 +49,16 @@ def take_up(
     try:
         layer = Sdf.Layer.OpenAsAnonymous(str(root))
         first, end = int(layer.startTimeCode), int(layer.endTimeCode)
-        files = [clips / f"f.{number:06d}.usdc" for number in range(first, last + 1)]
+        files = [clip_file(clips, number) for number in range(first, last + 1)]
         missing = [each.name for each in files if not each.is_file() or not each.stat().st_size]
         if missing or not files:
             raise _refused(root, f"{missing[0] if missing else 'every frame'} is missing")
-        found = Sdf.Layer.OpenAsAnonymous(str(clips / "manifest.usda"))
+        found = Sdf.Layer.OpenAsAnonymous(str(clips / MANIFEST))
         clip = Sdf.Layer.OpenAsAnonymous(str(files[0]))
         newest = Sdf.Layer.OpenAsAnonymous(str(files[-1]))
     except (Tf.ErrorException, OSError) as error:
         raise _refused(root, "a file of it cannot be read") from error
-    info = stage.sized(info, list(_points(clip, paths, first)))
+    info = sized(info, list(_points(clip, paths, first)))
     expected = manifest(paths, fields, info)
     if found.ExportToString() != expected.ExportToString():
         raise _refused(root, "it was recorded with other groups, fields or settings")

@@ -5,33 +5,36 @@
 temporary name and ``os.replace``, so that whatever kills the process, finished frames can be read.
 Memory does not grow with the number of frames.
 
-What is recorded is described on the host (:mod:`particlesim.output.usd.info`), so that any source of
-arrays can be recorded (:mod:`particlesim.output.usd.recorder` does it for simulations). How the root looks
-inside is :mod:`particlesim.output.usd.stage`, what clips hold :mod:`particlesim.output.usd.clips`.
+What is recorded is described on the host (:mod:`particlesim.output.usd.description`), so that any
+source of arrays can be recorded (:mod:`particlesim.output.usd.recorder` does it for simulations).
+How the root looks inside is in ``root``, what clips hold in ``samples``.
 """
 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
-from pxr import Sdf, Tf
+from pxr import Sdf
 
-from ... import validate
-from .. import files
-from . import clips, stage
+from .... import validate
+from ... import files
+from ..clips import MANIFEST, clip_file, clip_folder, set_frames, stale_files
+from ..description import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
+from ..layout import layout
+from ..recording import plain_errors
 from .frame import Frame, FrameChecker, field_kinds
-from .info import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
 from .resume import take_up
+from .root import author_root, sized
+from .samples import fill_clip, manifest
 
+OWNER = "UsdRecorder"
 SUFFIXES = (".usda", ".usd", ".usdc")
 
 
-class UsdWriter:
+class UsdWriter(files.Closing):
     """Writes frames, each of them safe as soon as :meth:`write` returns.
 
     Nothing is created before the first frame. The root is written just before that frame, with the
@@ -55,7 +58,7 @@ class UsdWriter:
             recording to be resumed that is of something else.
 
     Example:
-        >>> from particlesim.output.usd import PointsPrim
+        >>> from particlesim.output.usd.description import PointsPrim
         >>> drops = PointsPrim(0, "drops", slice(0, 2), np.arange(2), 0.1, (0.2, 0.5, 0.9))
         >>> with UsdWriter("drops.usda", StageInfo(points=[drops], frames=2, fps=24)) as writer:
         ...     for frame in range(2):
@@ -81,12 +84,12 @@ class UsdWriter:
         resume: int | None = None,
     ):
         self.path = Path(path)
-        self.clips = self.path.with_suffix(".clips")
+        self.clips = clip_folder(self.path)
         self.info = info
         self.fields = field_kinds(fields or {})
         self.overwrite = overwrite or resume is not None
         self._refuse_unusable()
-        self._layout = clips.layout(info)
+        self._layout = layout(info)
         self._checker = FrameChecker(info, self._layout.points, self.fields)
         self._root: Sdf.Layer | None = None
         self._clip: Sdf.Layer | None = None
@@ -129,7 +132,7 @@ class UsdWriter:
                 value that is not finite (in single precision); the message names frame and
                 particle. OSError: The file could not be written. Frames before are kept.
         """
-        owner = "UsdRecorder.write"
+        owner = f"{OWNER}.write"
         if self._closed:
             raise validate.fail(
                 owner, "frame", "come before close", frame, "make another UsdRecorder"
@@ -147,8 +150,8 @@ class UsdWriter:
         if frame > self._planned_end:
             # Twice as far, so that long unplanned runs rewrite the root a few times only.
             self._publish_root(2 * frame)
-        clips.fill_clip(self._clip, self._layout, self.info, checked)
-        _publish(self._clip, self.clips / f"f.{frame:06d}.usdc")
+        fill_clip(self._clip, self._layout, self.info, checked)
+        _publish(self._clip, clip_file(self.clips, frame))
         self._frame = frame
 
     def close(self) -> None:
@@ -157,45 +160,14 @@ class UsdWriter:
             self._publish_root(self.first if self._frame is None else self._frame)
         self._closed = True
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        try:
-            self.close()
-        except OSError:
-            if error is None:
-                raise
-            # The root still stands, with the planned end: the first error is the one to see.
-
     def _refuse_unusable(self) -> None:
-        owner, shown = "UsdRecorder", str(self.path)
-        if self.path.suffix not in SUFFIXES:
-            raise validate.fail(
-                owner, "path", f"end in {', '.join(SUFFIXES)}", shown, "choose one of these"
-            )
-        if not self.path.parent.is_dir():
-            raise FileNotFoundError(
-                f"{owner}: path must be in an existing folder, got {shown!r}; "
-                f"make {str(self.path.parent)!r} first."
-            )
+        files.check_new(OWNER, self.path, self.overwrite, suffixes=SUFFIXES, beside=[self.clips])
         siblings = [self.path.with_suffix(s) for s in SUFFIXES if s != self.path.suffix]
         for sibling in siblings:
             if sibling.exists() and self.clips.exists():
                 raise FileExistsError(
-                    f"{owner}: path must not share its frames with another root, got {shown!r} "
-                    f"next to {sibling.name!r}; choose another name."
-                )
-        for existing in (self.path, self.clips):
-            if existing.exists() and not self.overwrite:
-                raise FileExistsError(
-                    f"{owner}: path must be new, got {shown!r} where {existing.name!r} exists; "
-                    "choose another, or pass overwrite=True."
+                    f"{OWNER}: path must not share its frames with another root, got "
+                    f"{str(self.path)!r} next to {sibling.name!r}; choose another name."
                 )
 
     def _begin(self, frame: Frame) -> None:
@@ -204,17 +176,17 @@ class UsdWriter:
         self.overwrite = True  # from here on, what exists is this recording's own
         # The old root goes first: it must not lead readers to a mixture of old and new frames.
         self.path.unlink(missing_ok=True)
-        files.make_folder("UsdRecorder", self.clips)
-        for stale in [*self.clips.glob("f.*.usdc"), *self.clips.glob("manifest.*usda")]:
+        files.make_folder(OWNER, self.clips)
+        for stale in stale_files(self.clips):
             stale.unlink()
         clouds = [frame.x[rows] for rows, _ in frame.clouds]
-        self.info = stage.sized(self.info, clouds)
-        manifest = clips.manifest(self._layout, self.fields, self.info)
-        _publish(manifest, self.clips / "manifest.usda")
+        self.info = sized(self.info, clouds)
+        declared = manifest(self._layout, self.fields, self.info)
+        _publish(declared, self.clips / MANIFEST)
         self.first = frame.number
-        self._root = stage.author_root(self._layout, self.info, self.fields, frame)
+        self._root = author_root(self._layout, self.info, self.fields, frame)
         self._publish_root(frame.number + self.info.frames - 1)
-        self._clip = _mould(manifest)
+        self._clip = _mould(declared)
 
     def _go_on(self, last: int) -> None:
         """Take up what is on disk."""
@@ -227,7 +199,7 @@ class UsdWriter:
             self._publish_root(planned)
 
     def _publish_root(self, end: int) -> None:
-        stage.set_frames(self._root, self.clips.name, self.first, end)
+        set_frames(self._root, self.clips.name, self.first, end)
         _publish(self._root, self.path)
         self._planned_end = end
 
@@ -241,14 +213,5 @@ def _mould(manifest: Sdf.Layer) -> Sdf.Layer:
 
 def _publish(layer: Sdf.Layer, path: Path) -> None:
     """Write a layer so that readers find the old file or the new one, never a part."""
-    temporary = path.with_name(f"{path.stem}.tmp{path.suffix}")
-    try:
+    with files.whole(OWNER, path, "Frames written before are kept.") as temporary, plain_errors():
         layer.Export(str(temporary))
-        os.replace(temporary, path)
-    except (Tf.ErrorException, OSError) as error:
-        temporary.unlink(missing_ok=True)
-        reason = re.search(r" : '(.*)'", str(error))
-        raise OSError(
-            f"UsdRecorder: {path} must be writable, got {reason[1] if reason else error}; free "
-            "some space or choose another folder. Frames written before are kept."
-        ) from error

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from pxr import Sdf, Tf, Usd, UsdUtils
+from pxr import Sdf, Usd, UsdUtils
 
 from ... import validate
 from .. import files
-from .clips import clip_set_faults, opened
-from .recording import CLIPS, Recording, prims, quiet
+from .checking.clip_files import clip_set_faults
+from .recording import CLIPS, Recording, notes, plain_errors, prims, quiet
 
-OWNER = "usd_tools.pack"
+OWNER = "usd.pack"
 SUFFIXES = (".usdc", ".usd")
 SAVE_EVERY = 64 * 2**20  # bytes held in memory before they are put into the file
 
@@ -49,37 +48,16 @@ def pack(
         3
     """
     source, target = Path(path), Path(out)
-    _refuse(source, target, overwrite)
-    with quiet():
-        recording = Recording(OWNER, source)
-        _refuse_incomplete(recording)
-        with files.whole(OWNER, target, "The recording is as it was.") as part:
-            try:
-                count = _write(recording, part, target)
-            except Tf.ErrorException as error:
-                reason = re.search(r" : '(.*)'", str(error))
-                raise OSError(reason[1] if reason else str(error)) from None
-    return count
-
-
-def _refuse(source: Path, target: Path, overwrite: bool) -> None:
-    if target.suffix.lower() not in SUFFIXES:
-        raise validate.fail(
-            OWNER, "out", f"end in {', '.join(SUFFIXES)}", str(target), "choose one of these"
-        )
-    if not target.parent.is_dir():
-        raise FileNotFoundError(
-            f"{OWNER}: out must be in an existing folder, got {str(target)!r}; make it first."
-        )
     if target.exists() and source.exists() and target.samefile(source):
         raise validate.fail(
             OWNER, "out", "be another file than the recording", str(target), "choose another name"
         )
-    if target.exists() and not overwrite:
-        raise FileExistsError(
-            f"{OWNER}: out must be a new file, got {str(target)!r}, which exists; "
-            "choose another or overwrite it."
-        )
+    files.check_new(OWNER, target, overwrite, suffixes=SUFFIXES, argument="out")
+    with quiet():
+        recording = Recording(OWNER, source)
+        _refuse_incomplete(recording)
+        with files.whole(OWNER, target, "The recording is as it was.") as part, plain_errors():
+            return _write(recording, part, target)
 
 
 def _refuse_incomplete(recording: Recording) -> None:
@@ -99,10 +77,9 @@ def _write(recording: Recording, part: Path, target: Path) -> int:
     _move_assets(layer, recording.path, target)
     frames = recording.frames()
     rate = recording.stage.GetTimeCodesPerSecond()
-    own = dict(layer.customLayerData)
     # For the check: alone, one file cannot contradict its rate as clips can.
-    own["particlesim"] = {**own.get("particlesim", {}), "fps": rate}
-    layer.customLayerData = own
+    own = {**notes(recording.stage), "fps": rate}
+    layer.customLayerData = {**layer.customLayerData, "particlesim": own}
     if frames:
         layer.endTimeCode = frames[-1]
     recording.visit(frames, lambda stage, some: _copy_frames(recording, layer, stage, some))
@@ -135,7 +112,12 @@ def _copy_frames(
     """Copy the values of some frames, and put them into the file when there are many."""
     attributes, held = list(_clip_attributes(stage)), 0
     for frame in frames:
-        _refuse_unreadable(recording, frame)
+        damaged = recording.damaged(frame)
+        if damaged is not None:
+            raise validate.fail(
+                OWNER, f"frame {frame:g}", "be readable", damaged.name,
+                "run usd check, and record it again",
+            )  # fmt: skip
         with Sdf.ChangeBlock():
             for attribute in attributes:
                 value = attribute.Get(frame)
@@ -148,13 +130,3 @@ def _copy_frames(
     # What is set refers to the clip files until it is saved.
     layer.Save()
     return []
-
-
-def _refuse_unreadable(recording: Recording, frame: float) -> None:
-    for clip_set in recording.clip_sets:
-        for clip in clip_set.clips:
-            if clip.frame == frame and clip.path.is_file() and opened(clip.path) is None:
-                raise validate.fail(
-                    OWNER, f"frame {frame:g}", "be readable", clip.path.name,
-                    "run usd check, and record it again",
-                )  # fmt: skip

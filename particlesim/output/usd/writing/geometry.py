@@ -7,9 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 from pxr import Gf
 
+from ..description import Shape, StageInfo
 from .frame import Frame
-from .info import StageInfo
-from .shapes import Shape
 
 FOCAL_LENGTH = 35.0
 APERTURE = np.array([36.0, 20.25])  # 16:9, in the units of the focal length
@@ -88,8 +87,10 @@ def shape_corners(shape: Shape) -> np.ndarray:
 
 
 def posed(points: np.ndarray, pose: np.ndarray | None) -> np.ndarray:
-    """Points (n, 3) moved by a pose (4, 4), if there is one."""
-    return points if pose is None else points @ pose[:3, :3] + pose[3, :3]
+    """Points (n, 3) in rows times a pose (4, 4), if there is one that moves them."""
+    if pose is None or np.array_equal(pose, np.eye(4)):
+        return points
+    return points @ pose[:3, :3] + pose[3, :3]
 
 
 def posed_plane(shape: Shape, pose: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
