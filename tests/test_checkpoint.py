@@ -13,7 +13,6 @@ import warp as wp
 
 import particlesim as ps
 from particlesim.commands.scene_files import ready_scenes
-from particlesim.output.checkpoint import contents
 from particlesim.scene.fingerprint import fingerprint
 
 SCENES = list(ready_scenes())
@@ -27,7 +26,7 @@ SMALL = {
 
 
 def arrays(sim):
-    return {name: array.numpy().copy() for name, array in contents(sim).items()}
+    return {name: array.numpy().copy() for name, array in sim.frames.snapshot.contents().items()}
 
 
 def assert_same(sim, other):

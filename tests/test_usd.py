@@ -376,7 +376,7 @@ def test_existing_output_is_refused_and_kept(tmp_path):
     path, info = tmp_path / "out.usda", StageInfo(points=[group()], frames=5)
     position, _ = record(path, info, frames=5)
     with pytest.raises(
-        FileExistsError, match=r"^UsdRecorder: path must be new, .*overwrite=True\.$"
+        FileExistsError, match=r"^UsdRecorder: path must be a new file, .*overwrite=True\.$"
     ):
         UsdWriter(path, info)
     with pytest.raises(FileExistsError, match="share its frames"):
@@ -570,8 +570,14 @@ def test_memory_does_not_grow_with_frames(tmp_path):
         assert recorder._clip.ListAllTimeSamples() == [49]
 
 
-@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), Tf.ErrorException()])
-def test_a_write_that_fails_loses_no_frame(tmp_path, monkeypatch, error):
+@pytest.mark.parametrize(
+    ("owner", "name", "error"),
+    [
+        (os, "replace", OSError(28, "No space left on device")),
+        (Sdf.Layer, "Export", Tf.ErrorException()),
+    ],
+)
+def test_a_write_that_fails_loses_no_frame(tmp_path, monkeypatch, owner, name, error):
     path = tmp_path / "out.usda"
     position, velocity = motion(2)
 
@@ -581,8 +587,8 @@ def test_a_write_that_fails_loses_no_frame(tmp_path, monkeypatch, error):
     with UsdWriter(path, StageInfo(points=[group()], frames=2)) as recorder:
         recorder.write(0, position[0], velocity[0])
         before = folder_content(tmp_path)
-        monkeypatch.setattr(os, "replace", fail)
-        with pytest.raises(OSError, match=r"^UsdRecorder: .*f\.000001\.usdc must be writable"):
+        monkeypatch.setattr(owner, name, fail)
+        with pytest.raises(OSError, match=r"^UsdRecorder: .*f\.000001\.usdc' must be writable"):
             recorder.write(1, position[1], velocity[1])
         assert folder_content(tmp_path) == before
         monkeypatch.undo()

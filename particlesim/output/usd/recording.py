@@ -37,7 +37,7 @@ def plain_errors() -> Iterator[None]:
         yield
     except Tf.ErrorException as error:
         reason = re.search(r" : '(.*)'", str(error))
-        raise OSError(reason[1] if reason else str(error)) from None
+        raise OSError(reason[1] if reason else " ".join(str(error).split())) from None
 
 
 class Recording:
