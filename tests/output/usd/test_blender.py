@@ -20,7 +20,7 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(PYTHON is None, reason="no bpy; set BLENDER_PYTHON to a Python that has it"),
 ]
-SCRIPT = Path(__file__).parent / "data" / "blender_import.py"
+SCRIPT = Path(__file__).parents[2] / "data" / "blender_import.py"
 FRAMES = 4
 
 

@@ -2,41 +2,23 @@
 
 import numpy as np
 import pytest
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
+from pxr import Gf, Sdf, UsdGeom, UsdShade
 
-from particlesim.output.usd.checking.check import check
-from particlesim.output.usd.description import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
+from particlesim.output.usd.description import LinksPrim, MeshPrim, Shape, StageInfo
 from particlesim.output.usd.shapes import Shape as SameShape
 from particlesim.output.usd.writing.frame import vertex_normals
 from particlesim.output.usd.writing.writer import UsdWriter
 
-BLUE, RED = (0.2, 0.5, 0.9), (0.9, 0.2, 0.1)
-COUNT = 12
-ROOM = "/World/env_0000"
-
-
-def motion(frames, count=COUNT):
-    """Random positions and velocities, (frames, count, 3), in single precision."""
-    rng = np.random.default_rng(1)
-    return rng.normal(size=(2, frames, count, 3)).astype(np.float32)
-
-
-def group(**changed):
-    arguments = {
-        "world": 0, "name": "water", "indices": slice(0, COUNT), "ids": np.arange(COUNT),
-        "widths": 0.1, "color": BLUE,
-    }  # fmt: skip
-    return PointsPrim(**(arguments | changed))
-
-
-def opened(path):
-    """The stage, in which neither usd-core's validators nor ours find a fault at any frame."""
-    assert check(path) == []
-    return Usd.Stage.Open(str(path))
-
-
-def value(stage, path, frame):
-    return np.array(stage.GetAttributeAtPath(path).Get(frame))
+from .recordings import (
+    BLUE,
+    COUNT,
+    RED,
+    ROOM,
+    checked,
+    group,
+    motion,
+    value,
+)
 
 
 def tetrahedron():
@@ -62,7 +44,7 @@ def test_particles_come_and_go(tmp_path, instancer):
             age = rng.random(count + 2).astype(np.float32)
             out.write(frame, x, v, {"age": age}, rows={spray: (rows, ids)})
             written.append((x[rows], v[rows], ids, age[rows]))
-    stage = opened(tmp_path / "out.usda")
+    stage = checked(tmp_path / "out.usda")
     points = "positions" if instancer else "points"
     for frame, expected in enumerate(written):
         for name, array in zip(
@@ -80,7 +62,7 @@ def test_bounds_of_nothing_are_empty(tmp_path):
     with UsdWriter(tmp_path / "out.usda", StageInfo(points=[spray])) as out:
         nothing = np.zeros((0, 3))
         out.write(0, nothing, nothing, rows={spray: ([], [])})
-    stage = opened(tmp_path / "out.usda")
+    stage = checked(tmp_path / "out.usda")
     bound = UsdGeom.BBoxCache(0, ["default"]).ComputeLocalBound(
         stage.GetPrimAtPath(f"{ROOM}/water")
     )
@@ -96,7 +78,7 @@ def test_links_come_and_go(tmp_path):
     ) as out:
         for frame in range(3):
             out.write(frame, position[frame], velocity[frame], pairs={rope: pairs[frame]})
-    stage = opened(tmp_path / "out.usda")
+    stage = checked(tmp_path / "out.usda")
     for frame in range(3):
         counts = value(stage, f"{ROOM}/rope.curveVertexCounts", frame)
         assert counts.tolist() == [2] * len(pairs[frame])
@@ -118,7 +100,7 @@ def test_surfaces_whose_triangles_change(tmp_path):
     with UsdWriter(tmp_path / "out.usda", StageInfo(meshes=[skin], frames=3)) as out:
         for frame, mesh in enumerate(given):
             out.write(frame, np.zeros((0, 3)), np.zeros((0, 3)), meshes={skin: mesh})
-    stage = opened(tmp_path / "out.usda")
+    stage = checked(tmp_path / "out.usda")
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath(f"{ROOM}/skin"))
     assert mesh.GetSubdivisionSchemeAttr().Get() == UsdGeom.Tokens.none
     assert mesh.GetDoubleSidedAttr().Get() and mesh.GetNormalsInterpolation() == "vertex"
@@ -143,7 +125,7 @@ def test_surfaces_spanned_by_particles(tmp_path):
             heat = np.arange(6.0) + frame
             out.write(frame, x, x @ turn.T - x, {"heat": heat})
             x = x @ turn.T
-    stage = opened(tmp_path / "out.usda")
+    stage = checked(tmp_path / "out.usda")
     normals = [value(stage, f"{ROOM}/skin.normals", frame) for frame in range(2)]
     np.testing.assert_allclose(normals[1], normals[0] @ turn.T, atol=1e-6)
     np.testing.assert_allclose(np.linalg.norm(normals[0], axis=1), 1, rtol=1e-6)
@@ -190,7 +172,7 @@ def test_moving_shapes_have_their_transforms_in_the_clips(tmp_path):
             pose = ((0.5 * frame, 0, 0), np.linalg.matrix_power(turn, frame))
             poses = {shape: pose for shape in shapes[:4]}
             out.write(frame, position[frame], velocity[frame], poses=poses)
-    stage = opened(tmp_path / "out.usda")
+    stage = checked(tmp_path / "out.usda")
     cache = UsdGeom.XformCache()
     for frame in range(3):
         cache.SetTime(frame)
@@ -233,7 +215,7 @@ def test_widths_and_colors_may_be_fields(tmp_path, instancer):
         for k in range(2):
             values = {"widths": widths[k], "displayColor": shade[k], "world": np.arange(COUNT) - k}
             out.write(k, position[k], velocity[k], values)
-    stage = opened(tmp_path / "out.usda")
+    stage = checked(tmp_path / "out.usda")
     prim = stage.GetPrimAtPath(f"{ROOM}/water")
     kinds = {p.GetPrimvarName(): str(p.GetTypeName()) for p in
              UsdGeom.PrimvarsAPI(prim).GetPrimvars()}  # fmt: skip
@@ -262,7 +244,7 @@ def test_instances_are_spheres_of_the_particles_size(tmp_path, widths):
     with UsdWriter(tmp_path / "out.usda", info) as out:
         for k in range(2):
             out.write(k, position[k], velocity[k])
-    stage = opened(tmp_path / "out.usda")
+    stage = checked(tmp_path / "out.usda")
     instancer = UsdGeom.PointInstancer(stage.GetPrimAtPath(f"{ROOM}/water"))
     assert list(instancer.GetIdsAttr().Get()) == list(range(COUNT))
     ball = UsdGeom.Mesh(stage.GetPrimAtPath(instancer.GetPrototypesRel().GetTargets()[0]))
@@ -296,7 +278,7 @@ def test_the_layout_moves_worlds_and_not_points(tmp_path):
     info = StageInfo(points=points, layout={1: (20, 0, 0)}, periodic=box)
     with UsdWriter(tmp_path / "out.usda", info) as out:
         out.write(0, position[0], velocity[0])
-    stage = opened(tmp_path / "out.usda")
+    stage = checked(tmp_path / "out.usda")
     cache = UsdGeom.XformCache(0)
     for w in (0, 1):
         prim = stage.GetPrimAtPath(f"/World/env_000{w}/water")
@@ -310,87 +292,3 @@ def test_the_layout_moves_worlds_and_not_points(tmp_path):
     frustum = UsdGeom.Camera(stage.GetPrimAtPath("/World/camera")).GetCamera(0).frustum
     for corner in np.ndindex(2, 2, 2):
         assert frustum.Intersects(Gf.Vec3d(*np.where(corner, (25, 5, 5), (-5, -5, -5)).tolist()))
-
-
-# What is refused --------------------------------------------------------------------------------
-
-
-def everything():
-    """A description that leaves all open that can be."""
-    return {
-        "rows": group(indices=None, ids=None), "pairs": LinksPrim(0, "rope", None, 0.1, RED),
-        "meshes": MeshPrim(0, "skin", BLUE),
-        "poses": Shape.box((0, 0, 0), (1, 1, 1), moving=True),
-    }  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("changed", "match"),
-    [
-        ({"rows": None}, r"rows must be for \['water'\], which leave them open"),
-        ({"meshes": None}, r"meshes must be for \['skin'\]"),
-        ({"rows": ([0, 99], [0, 1])}, r"position must have shape \(100, 3\), or more rows"),
-        ({"rows": ([0, 1], [0, 0])}, "ids must be different"),
-        ({"rows": ([0, 1], [0])}, "ids must be 2 whole numbers"),
-        ({"pairs": [[0, 1, 2]]}, r"pairs must have shape \(m, 2\)"),
-        ({"pairs": [[0, 12]]}, r"position must have shape \(13, 3\)"),
-        (
-            {"meshes": (np.eye(3), [[0, 1, 3]], np.eye(3))},
-            "triangles must hold indices from 0 to 2",
-        ),
-        (
-            {"meshes": (np.eye(3), [[0, 1, 2]], np.eye(3)[:2])},
-            r"normals .*must have shape \(3, 3\)",
-        ),
-        ({"meshes": (np.full((3, 3), np.nan), [[0, 1, 2]], np.eye(3))}, "points .* must be finite"),
-    ],
-)
-def test_values_that_do_not_fit_are_refused(tmp_path, refused, changed, match):
-    prims = everything()
-    info = StageInfo(points=[prims["rows"]], links=[prims["pairs"]], meshes=[prims["meshes"]],
-                     shapes=[prims["poses"]])  # fmt: skip
-    good = {"rows": ([0, 1], [0, 1]), "pairs": [[0, 1]], "poses": ((0, 0, 0), np.eye(3)),
-            "meshes": (np.eye(3), [[0, 1, 2]], np.eye(3))}  # fmt: skip
-    given = {
-        name: {prims[name]: each} for name, each in (good | changed).items() if each is not None
-    }
-    out = UsdWriter(tmp_path / "out.usda", info)
-    with refused(match):
-        out.write(0, *motion(1)[:, 0], **given)
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("make", "match"),
-    [
-        (lambda: group(indices=None), "ids and widths must be None and one number"),
-        (lambda: group(ids=np.zeros(COUNT, int)), "ids must be different"),
-        (lambda: MeshPrim(0, "x", BLUE, slice(0, 3)), "triangles must be given with indices"),
-        (lambda: MeshPrim(0, "x", BLUE, slice(0, 3), [[0, 1, 3]]), "hold indices from 0 to 2"),
-        (lambda: Shape.mesh(np.eye(3), [[0, 1, 3]]), "triangles must hold indices from 0 to 2"),
-        (lambda: StageInfo(points=[group()], layout={0: (1, 2)}), r"layout must have shape \(3,\)"),
-    ],
-)
-def test_descriptions_that_make_no_sense_are_refused(refused, make, match):
-    with refused(match):
-        make()
-
-
-@pytest.mark.parametrize("fields", [{"widths": 3}, {"displayColor": 3}, {"a": "half"}], ids=str)
-def test_fields_of_other_kinds_are_refused(tmp_path, refused, fields):
-    with refused("fields"):
-        UsdWriter(tmp_path / "out.usda", StageInfo(points=[group()]), fields=fields)
-
-
-@pytest.mark.parametrize(
-    ("kind", "values", "match"),
-    [
-        ("int", np.arange(COUNT) + 0.5, "be whole numbers"),
-        ("int", np.arange(COUNT) + 2**31, "fit into 32 bits"),
-        ("color", np.zeros(COUNT), r"have shape \(12, 3\)"),
-    ],
-)
-def test_values_of_other_kinds_are_refused(tmp_path, refused, kind, values, match):
-    out = UsdWriter(tmp_path / "out.usda", StageInfo(points=[group()]), fields={"a": kind})
-    with refused(match):
-        out.write(0, *motion(1)[:, 0], {"a": values})

@@ -15,9 +15,8 @@ from pxr import Usd, UsdGeom
 
 from particlesim.simulation import resume
 
-sys.path.append(str(Path(__file__).parent))
-from kill_nursery import swing
-from test_resume import NEEDS, frames_of
+from .kill_nursery import swing
+from .runs import NEEDS, frames_of
 
 
 class Nursery:
