@@ -62,9 +62,7 @@ class PointsPrim:
     @property
     def rows(self) -> np.ndarray:
         """Rows of the frame arrays, in order, (n,) int; none where they come with the frames."""
-        if isinstance(self.indices, slice):
-            return np.arange(self.indices.start, self.indices.stop)
-        return np.zeros(0, dtype=np.int64) if self.indices is None else self.indices
+        return _listed(self.indices)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,9 +127,7 @@ class MeshPrim:
     @property
     def rows(self) -> np.ndarray:
         """Rows of the frame arrays, in order, (n,) int; none where points come with the frames."""
-        if isinstance(self.indices, slice):
-            return np.arange(self.indices.start, self.indices.stop)
-        return np.zeros(0, dtype=np.int64) if self.indices is None else self.indices
+        return _listed(self.indices)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -208,6 +204,12 @@ class StageInfo:
         """The worlds that something is drawn of."""
         parts: list[Any] = [*self.points, *self.links, *self.meshes, *self.shapes]
         return sorted({part.world for part in parts})
+
+
+def _listed(indices: np.ndarray | slice | None) -> np.ndarray:
+    if isinstance(indices, slice):
+        return np.arange(indices.start, indices.stop)
+    return np.zeros(0, dtype=np.int64) if indices is None else indices
 
 
 def row_indices(owner: str, name: str, given: Any, *, empty: bool = False) -> Any:

@@ -230,6 +230,16 @@ def test_a_missing_manifest(copy):
         pack(copy / "out.usda", copy / "new.usdc")
 
 
+def test_a_damaged_manifest(copy):
+    manifest = copy / "out.clips" / "manifest.usda"
+    manifest.write_text(manifest.read_text()[:500])
+    is_one(check(copy / "out.usda"), "manifest", "/World", "clips", None)
+    with pytest.raises(ValueError, match="manifest"):
+        pack(copy / "out.usda", copy / "new.usdc")
+    with pytest.raises(OSError, match=r"manifest\.usda"):
+        info(copy / "out.usda")
+
+
 def test_a_default_that_hides_the_clips(copy):
     def plant(file: Planted) -> None:
         spec = file.root.GetAttributeAtPath(BEADS.AppendProperty("points"))

@@ -1,11 +1,9 @@
-"""Checks of what is drawn: lengths of arrays, indices, and extents, at one frame.
-
-``values`` are a prim's attributes by name, as ``recording.read`` gives them.
-"""
+"""Checks of what is drawn: lengths of arrays, indices, and extents, at one frame."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,208 +14,199 @@ from .fault import Fault
 # Four roundings of single precision: extents are points plus and minus a half width.
 ROUNDING = 4 * 2.0**-23
 ALONG = ("velocities", "accelerations", "ids", "orientations", "scales", "angularVelocities",
-         "orientationsf", "invisibleIds")  # fmt: skip
-Values = Mapping[str, Any]
+         "orientationsf")  # fmt: skip
+# Which array says what each face or curve takes of the points, and how many are the least.
+COUNTS = {UsdGeom.Mesh: ("faceVertexCounts", 3), UsdGeom.BasisCurves: ("curveVertexCounts", 2)}
 
 
-def gprim_faults(prim: Usd.Prim, values: Values, frame: float | None) -> Iterator[Fault]:
-    """What is wrong with a prim's arrays at a frame."""
+def gprim_faults(prim: Usd.Prim, values: Mapping[str, Any], frame: float | None) -> Iterator[Fault]:
+    """What is wrong with a prim's arrays at a frame; ``values`` are its attributes by name."""
     base = "positions" if prim.IsA(UsdGeom.PointInstancer) else "points"
+    look = _Look(prim, values, frame, _size(values.get(base)))
     if prim.IsA(UsdGeom.PointBased) or base == "positions":
         if values.get(base) is None:
-            yield _fault("missing", prim, base, frame, "have a value", "none", "write it")
+            yield look.missing(base)
             return
-        sizes = _sizes(prim, values)
-        yield from _length_faults(prim, values, sizes, frame)
-        yield from _index_faults(prim, values, len(values[base]), frame)
+        yield from look.lengths()
+        yield from look.indices()
+        yield from look.ids()
     elif not prim.IsA(UsdGeom.Gprim):
         return
-    yield from _extent_faults(prim, values, frame)
+    yield from look.extent()
 
 
-def _fault(
-    kind: str,
-    prim: Usd.Prim,
-    name: str,
-    frame: float | None,
-    condition: str,
-    value: str,
-    remedy: str,
-) -> Fault:
-    return Fault(kind, str(prim.GetPath()), name, frame, condition, value, remedy)
+def _size(array: Any) -> int:
+    """Length of an array, 0 of none."""
+    return 0 if array is None else len(array)
 
 
-def _sizes(prim: Usd.Prim, values: Values) -> dict[str, int]:
-    """How many values each interpolation takes."""
-    count = len(values["positions" if prim.IsA(UsdGeom.PointInstancer) else "points"])
-    sizes = {"constant": 1, "vertex": count, "varying": count}
-    if prim.IsA(UsdGeom.Mesh):
-        sizes["uniform"] = _length(values, "faceVertexCounts")
-        sizes["faceVarying"] = _length(values, "faceVertexIndices")
-    elif prim.IsA(UsdGeom.BasisCurves):
-        sizes["uniform"] = _length(values, "curveVertexCounts")
-        if values.get("type") != UsdGeom.Tokens.linear:
-            del sizes["varying"]  # depends on the basis
-    elif prim.IsA(UsdGeom.Points):
-        sizes["uniform"] = count
-    return sizes
+@dataclass(frozen=True)
+class _Look:
+    """A look at one prim at one frame; ``count`` are its points or instances."""
 
+    prim: Usd.Prim
+    values: Mapping[str, Any]
+    frame: float | None
+    count: int
 
-def _length(values: Values, name: str) -> int:
-    value = values.get(name)
-    return 0 if value is None else len(value)
+    def fault(self, kind: str, name: str, condition: str, value: Any, remedy: str) -> Fault:
+        path = str(self.prim.GetPath())
+        return Fault(kind, path, name, self.frame, condition, str(value), remedy)
 
+    def missing(self, name: str) -> Fault:
+        return self.fault("missing", name, "have a value", "none", "write it")
 
-def _length_faults(
-    prim: Usd.Prim, values: Values, sizes: dict[str, int], frame: float | None
-) -> Iterator[Fault]:
-    """Arrays that do not have one value a point, or what their interpolation says."""
-    for name in ALONG:
-        value = values.get(name)
-        # No velocities at all is what USD itself takes for none.
-        if value is not None and len(value) not in (sizes["vertex"], 0) and name != "invisibleIds":
-            yield _length_fault(prim, name, frame, sizes["vertex"], len(value), "one a point")
-    for name, value in values.items():
-        if name in ("widths", "normals"):
-            default = "vertex"
-        elif name.startswith("primvars:") and not name.endswith(":indices"):
-            default = "constant"
-        else:
-            continue
-        attribute = prim.GetAttribute(name)
-        if not isinstance(value, np.ndarray) or not str(attribute.GetTypeName()).endswith("[]"):
-            continue
-        interpolation = attribute.GetMetadata("interpolation") or default
-        wanted = sizes.get(interpolation)
-        if wanted is None:
-            continue
-        wanted *= attribute.GetMetadata("elementSize") or 1
-        index = values.get(f"{name}:indices")
-        held = value if index is None else index
-        if len(held) != wanted:
-            yield _length_fault(prim, name, frame, wanted, len(held), f"as it is {interpolation}")
-        if index is not None and len(index) and not 0 <= index.min() <= index.max() < len(value):
-            yield _range_fault(prim, f"{name}:indices", frame, index, len(value))
+    def length(self, name: str, wanted: int, held: int, why: str) -> Fault:
+        condition, remedy = f"have {wanted} values, {why}", "write as many as there are points"
+        return self.fault("length", name, condition, held, remedy)
+
+    def outside(self, name: str, indices: np.ndarray, count: int) -> Iterator[Fault]:
+        """Indices beyond the ``count`` things that they point to."""
+        bad = indices[(indices < 0) | (indices >= count)]
+        if len(bad):
+            remedy = "point to what is there"
+            yield self.fault("index", name, f"be in 0..{count - 1}", int(bad[0]), remedy)
+
+    def sizes(self) -> dict[str, int]:
+        """How many values each interpolation takes."""
+        prim, values = self.prim, self.values
+        sizes = {"constant": 1, "vertex": self.count, "varying": self.count}
+        if prim.IsA(UsdGeom.Mesh):
+            sizes["uniform"] = _size(values.get("faceVertexCounts"))
+            sizes["faceVarying"] = _size(values.get("faceVertexIndices"))
+        elif prim.IsA(UsdGeom.BasisCurves):
+            sizes["uniform"] = _size(values.get("curveVertexCounts"))
+            if values.get("type") != UsdGeom.Tokens.linear:
+                del sizes["varying"]  # depends on the basis
+        elif prim.IsA(UsdGeom.Points):
+            sizes["uniform"] = self.count
+        return sizes
+
+    def lengths(self) -> Iterator[Fault]:
+        """Arrays that do not have one value a point, or what their interpolation says."""
+        for name in ALONG:
+            held = _size(self.values.get(name))
+            # No velocities at all is what USD itself takes for none.
+            if held not in (self.count, 0):
+                yield self.length(name, self.count, held, "one a point")
+        sizes = self.sizes()
+        for name, value in self.values.items():
+            if name in ("widths", "normals"):
+                default = "vertex"
+            elif name.startswith("primvars:") and not name.endswith(":indices"):
+                default = "constant"
+            else:
+                continue
+            attribute = self.prim.GetAttribute(name)
+            interpolation = attribute.GetMetadata("interpolation") or default
+            is_array = str(attribute.GetTypeName()).endswith("[]")
+            if isinstance(value, np.ndarray) and is_array and interpolation in sizes:
+                wanted = sizes[interpolation] * (attribute.GetMetadata("elementSize") or 1)
+                yield from self.interpolated(name, value, wanted, f"as it is {interpolation}")
+
+    def interpolated(self, name: str, value: np.ndarray, wanted: int, why: str) -> Iterator[Fault]:
+        """One array that has an interpolation, and perhaps indices."""
+        index = self.values.get(f"{name}:indices")
+        held = len(value if index is None else index)
+        if held != wanted:
+            yield self.length(name, wanted, held, why)
+        if index is not None:
+            yield from self.outside(f"{name}:indices", index, len(value))
         if name == "widths" and len(value) and value.min() < 0:
-            text = ("be at least 0", f"{value.min():g}", "write diameters")
-            yield _fault("width", prim, name, frame, *text)
+            least = f"{value.min():g}"
+            yield self.fault("width", name, "be at least 0", least, "write diameters")
 
+    def indices(self) -> Iterator[Fault]:
+        """Faces, curves and instances that do not fit the points or prototypes."""
+        for kind, (name, least) in COUNTS.items():
+            if self.prim.IsA(kind):
+                yield from self.counts(name, least)
+        if self.prim.IsA(UsdGeom.PointInstancer):
+            kinds = self.values.get("protoIndices")
+            prototypes = len(UsdGeom.PointInstancer(self.prim).GetPrototypesRel().GetTargets())
+            if kinds is None or len(kinds) != self.count:
+                yield self.length("protoIndices", self.count, _size(kinds), "one an instance")
+            else:
+                yield from self.outside("protoIndices", kinds, prototypes)
 
-def _length_fault(
-    prim: Usd.Prim, name: str, frame: float | None, wanted: int, held: int, why: str
-) -> Fault:
-    condition, remedy = f"have {wanted} values, {why}", "write as many as there are points"
-    return _fault("length", prim, name, frame, condition, str(held), remedy)
-
-
-def _index_faults(
-    prim: Usd.Prim, values: Values, count: int, frame: float | None
-) -> Iterator[Fault]:
-    """Faces, curves and instances that do not fit the points or prototypes."""
-    if prim.IsA(UsdGeom.Mesh):
-        counts, indices = values.get("faceVertexCounts"), values.get("faceVertexIndices")
-        if counts is None or indices is None:
-            name = "faceVertexCounts" if counts is None else "faceVertexIndices"
-            yield _fault("missing", prim, name, frame, "have a value", "none", "write it")
-            return
-        yield from _sum_faults(prim, "faceVertexIndices", frame, counts, len(indices), 3)
-        if len(indices) and not 0 <= indices.min() <= indices.max() < count:
-            yield _range_fault(prim, "faceVertexIndices", frame, indices, count)
-    elif prim.IsA(UsdGeom.BasisCurves):
-        counts = values.get("curveVertexCounts")
+    def counts(self, name: str, least: int) -> Iterator[Fault]:
+        """Counts of faces or curves that are too small, or do not add up to what there is."""
+        counts, held = self.values.get(name), self.count
+        divided = "points"
+        if self.prim.IsA(UsdGeom.Mesh):
+            divided = "faceVertexIndices"
+            corners = self.values.get(divided)
+            if counts is not None and corners is None:
+                yield self.missing(divided)
+                return
+            held = _size(corners)
         if counts is None:
-            name = "curveVertexCounts"
-            yield _fault("missing", prim, name, frame, "have a value", "none", "write it")
+            yield self.missing(name)
             return
-        yield from _sum_faults(prim, "points", frame, counts, count, 2)
-    elif prim.IsA(UsdGeom.PointInstancer):
-        kinds = values.get("protoIndices")
-        prototypes = len(UsdGeom.PointInstancer(prim).GetPrototypesRel().GetTargets())
-        if kinds is None or len(kinds) != count:
-            held = 0 if kinds is None else len(kinds)
-            yield _length_fault(prim, "protoIndices", frame, count, held, "one an instance")
-        elif count and not 0 <= kinds.min() <= kinds.max() < prototypes:
-            yield _range_fault(prim, "protoIndices", frame, kinds, prototypes)
-    ids = values.get("ids")
-    if ids is not None and len(np.unique(ids)) != len(ids):
-        order = np.sort(ids)
-        twice = int(order[:-1][order[1:] == order[:-1]][0])
-        text = ("be different", f"{twice} twice", "give every particle its own")
-        yield _fault("ids", prim, "ids", frame, *text)
+        if int(counts.sum()) != held:
+            yield self.length(divided, int(counts.sum()), held, "the sum of the counts")
+        if len(counts) and counts.min() < least:
+            text = (f"be at least {least}", int(counts.min()), "leave such ones out")
+            yield self.fault("count", name, *text)
+        if divided != "points":
+            yield from self.outside(divided, self.values[divided], self.count)
 
+    def ids(self) -> Iterator[Fault]:
+        """Two particles with one number."""
+        order = np.sort(self.values["ids"]) if self.values.get("ids") is not None else np.zeros(0)
+        twice = order[:-1][order[1:] == order[:-1]]
+        if len(twice):
+            text = ("be different", f"{int(twice[0])} twice", "give every particle its own")
+            yield self.fault("ids", "ids", *text)
 
-def _sum_faults(
-    prim: Usd.Prim, name: str, frame: float | None, counts: np.ndarray, held: int, least: int
-) -> Iterator[Fault]:
-    """Counts that are too small, or do not add up to what there is."""
-    total = int(counts.sum())
-    if total != held:
-        yield _length_fault(prim, name, frame, total, held, "the sum of the counts")
-    if len(counts) and counts.min() < least:
-        what = "faceVertexCounts" if least == 3 else "curveVertexCounts"
-        text = (f"be at least {least}", str(int(counts.min())), "leave such ones out")
-        yield _fault("count", prim, what, frame, *text)
+    def extent(self) -> Iterator[Fault]:
+        """An extent that is not there, or is not the bound of what is drawn."""
+        prim, held = self.prim, self.values.get("extent")
+        try:
+            expected = self.bound()
+        except ValueError:  # lengths that disagree, reported above
+            return
+        if expected is None or not np.isfinite(expected).all():
+            return
+        if held is None:
+            if prim.IsA(UsdGeom.PointBased) or prim.IsA(UsdGeom.PointInstancer):
+                text = ("have a value", "none", "write it at every frame: renderers cull by it")
+                yield self.fault("missing extent", "extent", *text)
+            return
+        if held.shape != (2, 3):
+            remedy = "write lower and upper"
+            yield self.fault("wrong extent", "extent", "be two corners", len(held), remedy)
+            return
+        slack = ROUNDING * float(np.abs(expected).max())
+        outside = (held[0] > expected[0] + slack).any() or (held[1] < expected[1] - slack).any()
+        # One extent for all frames holds them all; one a frame is the bound of that frame.
+        moving = {
+            name: prim.GetAttribute(name).ValueMightBeTimeVarying()
+            for name in ("extent", "points", "positions")
+        }
+        still = not moving["extent"] and (moving["points"] or moving["positions"])
+        if outside or (not still and (np.abs(held - expected) > slack).any()):
+            remedy = "write the bound of points and widths"
+            text = (f"be {_corners(expected)}", _corners(held), remedy)
+            yield self.fault("wrong extent", "extent", *text)
 
-
-def _range_fault(
-    prim: Usd.Prim, name: str, frame: float | None, indices: np.ndarray, count: int
-) -> Fault:
-    bad = indices[(indices < 0) | (indices >= count)]
-    text = (f"be in 0..{count - 1}", str(int(bad[0])), "point to what is there")
-    return _fault("index", prim, name, frame, *text)
-
-
-def _extent_faults(prim: Usd.Prim, values: Values, frame: float | None) -> Iterator[Fault]:
-    """An extent that is not there, or is not the bound of what is drawn."""
-    try:
-        expected = _bound(prim, values, frame)
-    except ValueError:  # lengths that disagree, reported above
-        return
-    if expected is None or not np.isfinite(expected).all():
-        return
-    held = values.get("extent")
-    if held is None:
-        if prim.IsA(UsdGeom.PointBased) or prim.IsA(UsdGeom.PointInstancer):
-            text = ("have a value", "none", "write it at every frame: renderers cull by it")
-            yield _fault("missing extent", prim, "extent", frame, *text)
-        return
-    if held.shape != (2, 3):
-        text = ("be two corners", f"{len(held)}", "write lower and upper")
-        yield _fault("wrong extent", prim, "extent", frame, *text)
-        return
-    slack = ROUNDING * float(np.abs(expected).max())
-    moving = prim.GetAttribute("extent").ValueMightBeTimeVarying()
-    outside = (held[0] > expected[0] + slack).any() or (held[1] < expected[1] - slack).any()
-    # One extent for all frames holds them all; one a frame is the bound of that frame.
-    still = not moving and any(
-        prim.GetAttribute(name).ValueMightBeTimeVarying() for name in ("points", "positions")
-    )
-    if outside or (not still and (np.abs(held - expected) > slack).any()):
-        text = (f"be {_corners(expected)}", _corners(held), "write the bound of points and widths")
-        yield _fault("wrong extent", prim, "extent", frame, *text)
-
-
-def _bound(prim: Usd.Prim, values: Values, frame: float | None) -> np.ndarray | None:
-    """Corners (2, 3) of what is drawn; None: nothing is, or nothing is known of it."""
-    if not prim.IsA(UsdGeom.PointBased):
-        boundable = UsdGeom.Boundable(prim)
-        time = Usd.TimeCode.Default() if frame is None else frame
-        bound = UsdGeom.Boundable.ComputeExtentFromPlugins(boundable, time) if boundable else None
-        return None if bound is None or not len(bound) else np.array(bound, dtype=np.float64)
-    points = values["points"]
-    if not len(points):
-        return None
-    half = 0.5 * np.asarray(values["widths"] if _wide(prim, values) else 0.0, dtype=np.float64)
-    if prim.IsA(UsdGeom.Curves):
-        half = half.max()
-    columns = [points[:, k].astype(np.float64) for k in range(3)]
-    return np.array([[(x - half).min() for x in columns], [(x + half).max() for x in columns]])
-
-
-def _wide(prim: Usd.Prim, values: Values) -> bool:
-    """Whether the points have widths."""
-    thick = prim.IsA(UsdGeom.Points) or prim.IsA(UsdGeom.Curves)
-    return thick and _length(values, "widths") > 0
+    def bound(self) -> np.ndarray | None:
+        """Corners (2, 3) of what is drawn; None: nothing is, or nothing is known of it."""
+        prim, points = self.prim, self.values.get("points")
+        if not prim.IsA(UsdGeom.PointBased):
+            boundable = UsdGeom.Boundable(prim)
+            time = Usd.TimeCode.Default() if self.frame is None else self.frame
+            found = boundable and UsdGeom.Boundable.ComputeExtentFromPlugins(boundable, time)
+            return np.array(found, dtype=np.float64) if found and len(found) else None
+        if points is None or not len(points):
+            return None
+        widths = self.values.get("widths")
+        thick = prim.IsA(UsdGeom.Points) or prim.IsA(UsdGeom.Curves)
+        half = 0.5 * np.asarray(widths if thick and _size(widths) else 0.0, dtype=np.float64)
+        if prim.IsA(UsdGeom.Curves):
+            half = half.max()
+        columns = [points[:, k].astype(np.float64) for k in range(3)]
+        return np.array([[(x - half).min() for x in columns], [(x + half).max() for x in columns]])
 
 
 def _corners(box: np.ndarray) -> str:

@@ -63,16 +63,17 @@ def relate(spec: Sdf.PrimSpec, name: str, target: Sdf.Path) -> None:
 
 def place(spec: Sdf.PrimSpec, pose: Gf.Matrix4d | None) -> None:
     """Author the prim's one transform; None: it comes with the clips."""
-    author(spec, "xformOp:transform", Types.Matrix4d, pose)
-    order = Vt.TokenArray(["xformOp:transform"])
-    author(spec, "xformOpOrder", Types.TokenArray, order, uniform=True)
+    _transform(spec, "xformOp:transform", Types.Matrix4d, pose)
 
 
 def shift(spec: Sdf.PrimSpec, offset: np.ndarray) -> None:
     """Author the prim's one transform, a translation."""
-    author(spec, "xformOp:translate", Types.Double3, Gf.Vec3d(*map(float, offset)))
-    order = Vt.TokenArray(["xformOp:translate"])
-    author(spec, "xformOpOrder", Types.TokenArray, order, uniform=True)
+    _transform(spec, "xformOp:translate", Types.Double3, Gf.Vec3d(*map(float, offset)))
+
+
+def _transform(spec: Sdf.PrimSpec, name: str, kind: Sdf.ValueTypeName, value: Any) -> None:
+    author(spec, name, kind, value)
+    author(spec, "xformOpOrder", Types.TokenArray, Vt.TokenArray([name]), uniform=True)
 
 
 def matrix(pose: np.ndarray) -> Gf.Matrix4d:
