@@ -13,7 +13,7 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
 
 from ... import validate
-from .clips import Clip, clip_sets, opened
+from .layout import Clip, clip_sets, opened
 
 PORTION = 16  # frames that are read before the clip files of a stage are let go
 CLIPS = Usd.ResolveInfoSourceValueClips

@@ -7,12 +7,11 @@ from collections.abc import Iterator, Sequence
 
 from pxr import Tf, Usd, UsdGeom, UsdValidation
 
-from ..clips import ClipSet
+from ..layout import ClipSet
 from ..recording import CLIPS, Recording, notes, prims, quiet, read
 from .clip_files import clip_faults, clip_set_faults
 from .fault import Fault, collapsed
-from .gprims import gprim_faults
-from .values import primvar_faults, value_faults
+from .prim_values import gprim_faults, primvar_faults, value_faults
 
 REMEDIES = {
     "MissingDefaultPrim": "set it to the prim that holds all others",

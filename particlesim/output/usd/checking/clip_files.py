@@ -7,9 +7,9 @@ from pathlib import Path
 
 from pxr import Sdf, Usd
 
-from ..clips import Clip, ClipSet, opened
+from ..layout import Clip, ClipSet, opened
 from ..recording import CLIPS, Recording
-from .fault import Fault
+from .fault import Fault, type_fault
 
 AGAIN = "record it again, or go on from the last checkpoint before"
 
@@ -114,12 +114,6 @@ def _sample_faults(
     wanted = manifest.GetAttributeAtPath(path).typeName
     if held and held.typeName.type != wanted.type:
         yield type_fault(prim, name, clip.frame, str(held.typeName), str(wanted))
-
-
-def type_fault(prim: str, name: str, frame: float | None, held: str, wanted: str) -> Fault:
-    """A value of another type than its attribute; half precision has a kind of its own."""
-    kind = "half" if "half" in held or "quath" in held else "type"
-    return Fault(kind, prim, name, frame, f"hold {wanted}", held, f"write {wanted}")
 
 
 def _relative(path: Path, folder: Path) -> str:

@@ -46,6 +46,12 @@ class Fault:
         return " ".join(line.split())
 
 
+def type_fault(prim: str, name: str, frame: float | None, held: str, wanted: str) -> Fault:
+    """A value of another type than its attribute; half precision has a kind of its own."""
+    kind = "half" if "half" in held or "quath" in held else "type"
+    return Fault(kind, prim, name, frame, f"hold {wanted}", held, f"write {wanted}")
+
+
 def collapsed(faults: Iterable[Fault]) -> list[Fault]:
     """One fault for those that differ in the frame only, in the order in which they were found."""
     groups: dict[tuple[str, str, str], list[Fault]] = {}

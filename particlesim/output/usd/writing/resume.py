@@ -11,9 +11,8 @@ import numpy as np
 from pxr import Sdf, Tf
 
 from .... import validate
-from ..clips import MANIFEST, clip_file
 from ..description import StageInfo
-from ..layout import Layout
+from ..layout import MANIFEST, Layout, clip_file
 from .root import sized
 from .samples import Fields, manifest
 

@@ -21,9 +21,8 @@ from pxr import Sdf
 
 from .... import validate
 from ... import files
-from ..clips import MANIFEST, clip_file, clip_folder, set_frames, stale_files
 from ..description import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
-from ..layout import layout
+from ..layout import MANIFEST, clip_file, clip_folder, layout, set_frames, stale_files
 from ..recording import plain_errors
 from .frame import Frame, FrameChecker, field_kinds
 from .resume import take_up
