@@ -122,15 +122,15 @@ def test_worlds_that_agree_have_no_more_than_one_world(device):
     assert [each.users for each in batch.neighbors.lists] == [
         each.users for each in alone.neighbors.lists
     ]
-    assert [each.name for each in batch.passes] == [each.name for each in alone.passes]
-    assert len(alone.passes) == 2
+    assert [each.name for each in batch.loop.passes] == [each.name for each in alone.loop.passes]
+    assert len(alone.loop.passes) == 2
 
 
 def test_worlds_that_differ_each_have_their_passes(device):
     """One pass for both forces where they share, one each where they do not."""
     batch = ps.Simulation([two_cutoffs(90, c) for c in (1.6, 4.0)], device=device)
     assert len(batch.neighbors.lists) == 2
-    assert sorted(each.name for each in batch.passes) == [
+    assert sorted(each.name for each in batch.loop.passes) == [
         "PairPotential", "PairPotential", "PairPotential + PairPotential", "UniformGravity",
     ]  # fmt: skip
 

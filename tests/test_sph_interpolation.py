@@ -1,4 +1,4 @@
-"""``SPH.interpolate``: sums at points against brute force, and what it accepts."""
+"""``Simulation.interpolate``: sums at points against brute force, and what it accepts."""
 
 import functools
 
@@ -166,7 +166,7 @@ def test_each_world_has_its_own_fluid():
 @pytest.mark.parametrize(
     "arguments, message",
     [
-        (([[0, 0]], "density"), r"SPH.interpolate: points must have shape \(n, 3\)"),
+        (([[0, 0]], "density"), r"Simulation.interpolate: points must have shape \(n, 3\)"),
         (([[0, 0, np.nan]], "density"), r"points\[0, 2\] must be finite"),
         (([[0, 0, 0]], "temperature"), "field must be one of charge, density, .*got 'temperature'"),
         (([[0, 0, 0]], np.zeros(7)), "field must have a row for each of the fluid's 400 particles"),

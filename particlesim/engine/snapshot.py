@@ -13,8 +13,10 @@ import numpy as np
 import warp as wp
 
 from ..kernels.engine.copy import copy_kernel
+from ..scene.part import Part
 from .execution.launch import launch
 from .loop import Loop
+from .observers import Observer
 
 # Made anew in every substep, or never changed: nothing to keep.
 TRANSIENT = frozenset(
@@ -38,7 +40,7 @@ class Snapshot:
         }
         for k, each in enumerate(loop.neighbors.verlet):
             self.arrays[f"neighbors_{k}"] = each.x_listed
-        self._owners = {
+        self._owners: dict[str, Part | Observer] = {
             **{f"interaction_{k}": part for k, part in enumerate(loop.interactions)},
             **{f"constraint_{k}": part for k, part in enumerate(loop.constraints)},
             **{each.name: each for each in loop.observers.all},
