@@ -21,6 +21,7 @@ import threading
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
+from pathlib import Path
 from typing import Any, Self
 from urllib.parse import parse_qs, urlsplit
 
@@ -33,19 +34,11 @@ from .live import Live
 OWNER = "view"
 LOOPBACK = "127.0.0.1"
 HOSTS = ("127.0.0.1", "localhost")
+KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 # Nothing else of the package can be asked for, by whatever path.
-PAGE = {
-    "/": ("index.html", "text/html"),
-    "/style.css": ("style.css", "text/css"),
-    "/view.js": ("view.js", "text/javascript"),
-    "/panel.js": ("panel.js", "text/javascript"),
-    "/keys.js": ("keys.js", "text/javascript"),
-    "/film.js": ("film.js", "text/javascript"),
-    "/camera.js": ("camera.js", "text/javascript"),
-    "/painter.js": ("painter.js", "text/javascript"),
-    "/gl.js": ("gl.js", "text/javascript"),
-    "/shaders.js": ("shaders.js", "text/javascript"),
-}
+HOME = resources.files("particlesim.pictures.view") / "page"
+FILES = {f"/{file.name}": file for file in HOME.iterdir() if Path(file.name).suffix in KINDS}
+PAGE = {"/": FILES["/index.html"], **FILES}
 HEADERS = {
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
@@ -203,9 +196,8 @@ class Handler(BaseHTTPRequestHandler):
         url = urlsplit(self.path)
         words = {name: values[-1] for name, values in parse_qs(url.query).items()}
         if url.path in PAGE:
-            name, kind = PAGE[url.path]
-            page = resources.files("particlesim.pictures.view") / "page" / name
-            return f"{kind}; charset=utf-8", page.read_bytes()
+            page = PAGE[url.path]
+            return f"{KINDS[Path(page.name).suffix]}; charset=utf-8", page.read_bytes()
         shown, footage = self.shown, self.shown.footage
         if url.path == "/scene":
             return _json(shown.scene())

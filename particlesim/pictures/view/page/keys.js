@@ -5,7 +5,7 @@ import { element } from "./panel.js";
 export function listen(view) {
   element("play").addEventListener("click", () => view.play(!view.state.playing));
   element("reset").addEventListener("click", () => view.reset());
-  element("fit").addEventListener("click", () => view.fit());
+  element("fit").addEventListener("click", () => view.screen.fit());
   element("dismiss").addEventListener("click", () => view.panel.complain(""));
   element("slider").addEventListener("input", ({ target }) => view.stepTo(target.valueAsNumber));
   const turnWorld = (step) => {
@@ -21,7 +21,7 @@ export function listen(view) {
     ArrowDown: () => turnWorld(1),
     Home: () => view.stepTo(0),
     End: () => view.stepTo(Infinity),
-    f: () => view.fit(),
+    f: () => view.screen.fit(),
     r: () => view.live && view.reset(),
   };
   window.addEventListener("keydown", (event) => {

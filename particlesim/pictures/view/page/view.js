@@ -1,15 +1,12 @@
 // The page: state, time, and what goes on between the controls, the server and the picture.
 
-import { Camera, attach } from "./camera.js";
 import { Film, ask, unpack } from "./film.js";
-import { Painter } from "./painter.js";
 import { listen } from "./keys.js";
 import { Panel, element } from "./panel.js";
+import { Screen } from "./screen.js";
 
 const AHEAD = 8; // frames fetched before they are due
-const SLOW = 30; // milliseconds a picture, from which on motion is drawn with fewer samples
 const POLL = { live: 200, file: 1500 }; // milliseconds between questions for news
-const KEPT = 1e4; // pixels a side that are drawn at most
 
 class View {
   constructor() {
@@ -19,32 +16,27 @@ class View {
       index: 0, playing: !start.has("paused"), speed: 1, world: null, apart: true, color: null,
       map: "viridis", low: 0, high: 1, auto: true, boundaries: "solid", grid: true,
     };
-    this.canvas = element("canvas");
     this.panel = new Panel((change) => this.change(change));
     this.film = new Film((index) => this.arrived(index), (index, error) => this.missed(index, error));
     this.shown = null; // index of the frame in the picture
     this.due = 0; // frames that should have been shown since
-    this.moved = 0; // when the camera was moved last
-    this.pace = 0; // milliseconds a picture, of late
-    this.pictures = 0; // drawn so far
     this.turn = 0; // of asking for frames anew
+    this.refit = true; // see all of the next frame
     this.live = null;
   }
 
   async run() {
     this.panel.complain("");
-    this.painter = new Painter(this.canvas);
-    this.canvas.addEventListener("webglcontextlost", () => {
-      this.panel.complain("the graphics card was taken away; reload the page");
-    });
+    const lost = () => this.panel.complain("the graphics card was taken away; reload the page");
+    this.screen = new Screen(element("canvas"), lost);
     await this.open();
     const { start, state, film } = this;
+    state.grid = this.scene.floor !== null;
     const [world, color] = [Number(start.get("world") ?? NaN), start.get("color")];
     if (this.scene.worlds.includes(world)) state.world = world;
     if (start.has("frame")) state.index = Math.max(0, film.codes.indexOf(Number(start.get("frame"))));
     state.color = this.scene.fields.includes(color) ? color : this.scene.color;
     await this.requery();
-    attach(() => this.camera, this.canvas, () => this.touch(), () => this.fit());
     listen(this);
     requestAnimationFrame((now) => this.tick(now));
     if (this.live && state.playing) this.order("play");
@@ -57,8 +49,7 @@ class View {
     this.film.codes = this.scene.frames;
     this.take = this.scene.take;
     this.live = this.scene.live;
-    this.camera ??= new Camera(this.scene.up, this.scene.camera);
-    if (this.pictures === 0) this.state.grid = this.scene.floor !== null;
+    this.screen.open(this.scene);
     this.state.index = Math.min(this.state.index, this.film.codes.length - 1);
     this.panel.offer(this.scene);
   }
@@ -73,7 +64,7 @@ class View {
       await this.requery();
     }
     this.panel.show(this.state);
-    this.touch();
+    this.screen.touch();
   }
 
   // Ask for frames anew, as the state wants them.
@@ -91,8 +82,7 @@ class View {
       film.query = this.query();
       const still = unpack(await (await ask(`still?${film.query}`)).arrayBuffer());
       if (turn !== this.turn) return;
-      this.still = still;
-      this.painter.upload("still", still);
+      this.screen.upload("still", still);
       this.shown = null;
       this.panel.complain("");
     } catch (error) {
@@ -139,19 +129,18 @@ class View {
   // Put the frame of the present index into the picture, if it is here.
   present() {
     const { index } = this.state;
+    const { screen } = this;
     const packet = this.film.get(index);
-    if (!packet || !this.still || this.shown === index) return;
-    this.painter.upload("frame", packet);
-    this.frame = packet;
+    if (!packet || !screen.packets.still || this.shown === index) return;
+    screen.upload("frame", packet);
     this.shown = index;
-    const count = (name) => (packet.arrays[name]?.count ?? 0) + (this.still.arrays[name]?.count ?? 0);
     this.panel.counts({
-      particles: count("thing.ball"), links: count("thing.cone") / 2,
-      triangles: (count("thing.corner") + count("thing.veil")) / 3,
+      particles: screen.count("thing.ball"), links: screen.count("thing.cone") / 2,
+      triangles: (screen.count("thing.corner") + screen.count("thing.veil")) / 3,
     });
-    if (!this.fitted || this.refit) this.fit();
+    if (this.refit) screen.fit();
+    this.refit = false;
     this.showTime();
-    this.touch();
   }
 
   go(index) {
@@ -162,6 +151,11 @@ class View {
     this.present();
     this.showTime();
     this.fetch();
+  }
+
+  stepTo(index) {
+    if (this.state.playing) this.play(false);
+    this.go(index);
   }
 
   showTime() {
@@ -237,43 +231,11 @@ class View {
     this.fetch();
   }
 
-  get box() {
-    const boxes = [this.frame?.box, this.still?.box].filter(Boolean);
-    if (!boxes.length) return [[-1, -1, -1], [1, 1, 1]];
-    const ends = (k, choose) => [0, 1, 2].map((i) => choose(...boxes.map((box) => box[k][i])));
-    return [ends(0, Math.min), ends(1, Math.max)];
-  }
-
-  fit() {
-    const { clientWidth: width, clientHeight: height } = this.canvas;
-    const below = (height - element("footer").offsetTop) / height;
-    const right = (width - element("panel").offsetLeft) / width;
-    // On a small page they may lie on the picture.
-    this.camera.fit(this.box, width / height, below < 0.3 ? below : 0, right < 0.3 ? right : 0);
-    this.fitted = true;
-    this.refit = false;
-    this.touch();
-  }
-
-  // Something looks different now.
-  touch() {
-    this.moved = performance.now();
-    this.stale = true;
-  }
-
   tick(now) {
     const elapsed = Math.min(now - (this.before ?? now), 200);
     this.before = now;
     if (this.state.playing) this.advance(elapsed);
-    if (this.resized()) this.touch();
-    const resting = now - this.moved > 180 && !this.state.playing;
-    if (this.stale) {
-      this.pace += 0.2 * (elapsed - this.pace);
-      this.draw(this.pace < SLOW ? 2 : 1);
-      this.stale = false;
-    } else if (resting && this.samples < 2 && this.pace < 4 * SLOW) {
-      this.draw(2);
-    }
+    this.screen.refresh(this.state, elapsed);
     requestAnimationFrame((time) => this.tick(time));
   }
 
@@ -308,35 +270,6 @@ class View {
     if (!this.live) return false;
     const { error, done, planned } = this.live;
     return this.film.codes.length <= done || (!error && done < planned);
-  }
-
-  resized() {
-    const ratio = window.devicePixelRatio || 1;
-    const size = [this.canvas.clientWidth, this.canvas.clientHeight];
-    const [width, height] = size.map((x) => Math.max(1, Math.min(KEPT, Math.round(x * ratio))));
-    if (this.canvas.width === width && this.canvas.height === height) return false;
-    Object.assign(this.canvas, { width, height });
-    return true;
-  }
-
-  draw(samples) {
-    if (!this.still) return;
-    // Small pixels need no more samples.
-    this.samples = window.devicePixelRatio >= 2 ? 1 : samples;
-    const { up, floor } = this.scene;
-    const box = this.box;
-    const lowest = box[0].reduce((s, x, k) => s + x * up[k], 0);
-    this.painter.draw({
-      camera: this.camera, box, up, boundaries: this.state.boundaries, samples: this.samples,
-      floor: this.state.grid ? floor ?? lowest : null,
-    });
-    this.samples = samples;
-    this.pictures += 1;
-  }
-
-  stepTo(index) {
-    if (this.state.playing) this.play(false);
-    this.go(index);
   }
 }
 

@@ -10,7 +10,7 @@ import pytest
 from particlesim.cli import main
 
 Image = pytest.importorskip("PIL.Image")
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 # An image, and the indented block of commands that follows it.
 PICTURES = re.findall(r"!\[[^\]]*\]\((\S+\.png)\)\n\n((?:    .+\n)+)", README)

@@ -23,9 +23,9 @@ FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 # What is in the picture, drawn anew: WebGL keeps nothing of the last one.
 PIXELS = """() => {
-  const { gl } = particlesim.painter;
-  particlesim.draw(1);
-  const { width, height } = particlesim.canvas;
+  const { gl } = particlesim.screen.painter;
+  particlesim.screen.draw(particlesim.state, 1);
+  const { width, height } = particlesim.screen.canvas;
   const bytes = new Uint8Array(4 * width * height);
   gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
   let text = "";
@@ -34,7 +34,9 @@ PIXELS = """() => {
   }
   return [width, height, btoa(text)];
 }"""
-READY = "() => particlesim.still && particlesim.shown === particlesim.engine.state.index"
+CAMERA = "[particlesim.screen.camera.distance, ...particlesim.screen.camera.target]"
+FRAME = "particlesim.screen.packets.frame.arrays"
+READY = "() => particlesim.screen.packets.still && particlesim.shown === particlesim.state.index"
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +64,7 @@ def show(browser):
         page.on("pageerror", lambda error: said.append(str(error)))
         page.goto(server.url + start)
         page.wait_for_function(READY)
-        if not page.evaluate("() => !!particlesim.painter.gl"):
+        if not page.evaluate("() => !!particlesim.screen.painter.gl"):
             pytest.skip("no WebGL 2")
         return page
 
@@ -124,11 +126,11 @@ def test_spheres_are_true_spheres(show, tmp_path):
     with Server(Footage(tmp_path / "two.usda")) as serving:
         page = show(serving)
         page.evaluate(
-            "() => { particlesim.engine.state.grid = false; particlesim.camera.turn(0.6, -0.2); }"
+            "() => { particlesim.state.grid = false; particlesim.screen.camera.turn(0.6, -0.2); }"
         )
         seen = pixels(page)
         camera = page.evaluate(
-            "() => { const { axes, target, distance, slope } = particlesim.camera;"
+            "() => { const { axes, target, distance, slope } = particlesim.screen.camera;"
             " return [axes, target, distance, slope]; }"
         )
     axes, target, distance, slope = (np.array(each) for each in camera)
@@ -178,15 +180,17 @@ def test_frames_camera_slider_and_keys(show, server):
     turned = pixels(page)
     assert (turned != first).any(axis=-1).mean() > 0.05
     page.mouse.wheel(0, 300)
-    page.wait_for_function("() => particlesim.camera.distance > 1.2 * particlesim.camera.size")
+    page.wait_for_function(
+        "() => particlesim.screen.camera.distance > 1.2 * particlesim.screen.camera.size"
+    )
     smaller = pixels(page)
     assert (smaller[..., 2] - smaller[..., 0] > 60).mean() < 0.8 * blue
     # Space plays: frames follow each other, from the last to the first again.
     page.keyboard.press("Space")
-    page.wait_for_function("() => particlesim.engine.state.index >= 3")
-    page.wait_for_function("() => particlesim.engine.state.index < 3")
+    page.wait_for_function("() => particlesim.state.index >= 3")
+    page.wait_for_function("() => particlesim.state.index < 3")
     page.keyboard.press("Space")
-    assert not page.evaluate("() => particlesim.engine.state.playing")
+    assert not page.evaluate("() => particlesim.state.playing")
     assert page.locator("#error").is_hidden()
 
 
@@ -196,7 +200,7 @@ def test_worlds_colors_and_boundaries(show, server):
     assert page.locator("#counts").inner_text().startswith(f"{WORLDS * count} particles")
     everything = pixels(page)
     page.locator("#world").select_option("1")
-    page.wait_for_function(f"() => particlesim.frame.arrays['thing.ball'].count === {count}")
+    page.wait_for_function(f"() => {FRAME}['thing.ball'].count === {count}")
     page.wait_for_function(READY)
     assert page.locator("#counts").inner_text().startswith(f"{count} particles")
     one = pixels(page)
@@ -206,12 +210,12 @@ def test_worlds_colors_and_boundaries(show, server):
     ).sum() / 2
     page.locator("#canvas").focus()
     page.keyboard.press("ArrowDown")
-    page.wait_for_function("() => particlesim.engine.state.world === 2")
+    page.wait_for_function("() => particlesim.state.world === 2")
     page.keyboard.press("ArrowUp")
-    page.wait_for_function(f"() => particlesim.engine.state.world === 1 && ({READY})()")
+    page.wait_for_function(f"() => particlesim.state.world === 1 && ({READY})()")
     # By value: the legend has the range that the server says, which may be set.
     page.locator("#color").select_option("speed")
-    page.wait_for_function(f"() => particlesim.frame.arrays['thing.ball_color'].count === {count}")
+    page.wait_for_function(f"() => {FRAME}['thing.ball_color'].count === {count}")
     assert page.locator("#scale").is_visible() and page.locator("#groups").is_hidden()
     low, high = (float(page.locator(end).input_value()) for end in ("#low", "#high"))
     assert 0 <= low < high
@@ -220,15 +224,13 @@ def test_worlds_colors_and_boundaries(show, server):
     page.locator("#map").select_option("gray")
     page.locator("#high").fill(str(low + 1e-3))
     page.locator("#high").press("Enter")
-    page.wait_for_function(
-        "() => particlesim.frame.arrays['thing.ball_color'].values.every((x) => x > 200)"
-    )
+    page.wait_for_function(f"() => {FRAME}['thing.ball_color'].values.every((x) => x > 200)")
     # Boundaries: each way looks different, and without them there is less.
     page.evaluate("() => { particlesim.change({ grid: false }); }")
     looks = {}
     for way in ("solid", "edges", "none"):
         page.locator("#boundaries").select_option(way)
-        page.wait_for_function(f"() => particlesim.engine.state.boundaries === '{way}'")
+        page.wait_for_function(f"() => particlesim.state.boundaries === '{way}'")
         looks[way] = pixels(page)
     assert (looks["solid"] != looks["edges"]).any() and (looks["edges"] != looks["none"]).any()
     assert (looks["solid"] != looks["none"]).any(axis=-1).mean() > 0.02
@@ -236,9 +238,9 @@ def test_worlds_colors_and_boundaries(show, server):
 
 def test_touch_pinches_and_moves(show, server):
     page = show(server)
-    before = page.evaluate("() => [particlesim.camera.distance, ...particlesim.camera.target]")
+    before = page.evaluate(f"() => {CAMERA}")
     page.evaluate("""() => {
-      const canvas = particlesim.canvas;
+      const canvas = particlesim.screen.canvas;
       canvas.setPointerCapture = () => {};
       const send = (type, pointerId, clientX, clientY) => canvas.dispatchEvent(
         new PointerEvent(type, { pointerId, clientX, clientY, pointerType: "touch", buttons: 1 }));
@@ -249,7 +251,7 @@ def test_touch_pinches_and_moves(show, server):
       send("pointerup", 1, 180, 190);
       send("pointerup", 2, 260, 190);
     }""")
-    after = page.evaluate("() => [particlesim.camera.distance, ...particlesim.camera.target]")
+    after = page.evaluate(f"() => {CAMERA}")
     assert after[0] < 0.6 * before[0]  # twice as far apart: half the distance, less what is bent
     assert np.abs(np.subtract(after[1:], before[1:])).max() > 0.01
 
@@ -276,14 +278,14 @@ def test_a_running_scene_plays_pauses_and_resets(show):
         with Server(running) as serving:
             page = show(serving, "")
             wait_frame(page, FRAMES)  # it starts by itself
-            page.wait_for_function("() => !particlesim.engine.state.playing")
+            page.wait_for_function("() => !particlesim.state.playing")
             end = pixels(page)
             page.keyboard.press("r")
             page.wait_for_function("() => particlesim.film.codes.length === 1")
             wait_frame(page, 0)
             assert running.done == 0 and (pixels(page) != end).any()
             page.keyboard.press("Space")
-            page.wait_for_function("() => particlesim.engine.state.index >= 2")
+            page.wait_for_function("() => particlesim.state.index >= 2")
             page.keyboard.press("Space")
             deadline = time.monotonic() + 10
             while running.playing and time.monotonic() < deadline:
