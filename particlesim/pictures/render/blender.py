@@ -1,7 +1,8 @@
 """Runs inside an interpreter with ``bpy``, as a script: renders frames of a USD file by Cycles.
 
-It is given the path of a JSON file (see ``particlesim.pictures.render.cycles``), and prints a line for
-every picture it has written. It imports nothing of this package, which that interpreter may not have.
+It is given the path of a JSON file (see ``particlesim.pictures.render.cycles``), and prints a line
+for every picture it has written. It imports nothing of this package, which that interpreter may
+not have.
 """
 
 from __future__ import annotations

@@ -48,7 +48,6 @@ class Lists:
 
     Args:
         crew: Runs the kernels.
-        name: Of the memory that its pixels are kept in.
         view: The view.
         boxes: Samples of each shape, ``vec4i``.
         nearest: Smallest depth of each, ``float32``.

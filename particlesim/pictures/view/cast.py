@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom
 
-from ...output.usd.layout import is_boundary
+from ...output.usd.layout import is_boundary, is_outline, room
+from ...output.usd.recording import prims
 from ..render.paint import Paint
 from ..render.prims import READERS
 
@@ -42,7 +43,7 @@ def cast(stage: Usd.Stage) -> list[Member]:
     """All prims that are drawn at some time."""
     members = []
     varying: dict[Sdf.Path, bool] = {}
-    scanned = iter(Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()))
+    scanned = prims(stage)
     for prim in scanned:
         if prim.IsA(UsdGeom.PointInstancer):
             scanned.PruneChildren()  # its prototypes are no prims of their own
@@ -65,10 +66,10 @@ def coinciding(stage: Usd.Stage, worlds: Sequence[int]) -> bool:
     """Whether there are several worlds, and none of them has been put anywhere."""
     if len(worlds) < 2:
         return False
-    rooms = [stage.GetPrimAtPath(f"/World/env_{world:04d}") for world in worlds]
+    rooms = [stage.GetPrimAtPath(room(world)) for world in worlds]
     return all(
-        room.IsA(UsdGeom.Xformable) and not UsdGeom.Xformable(room).GetOrderedXformOps()
-        for room in rooms
+        each.IsA(UsdGeom.Xformable) and not UsdGeom.Xformable(each).GetOrderedXformOps()
+        for each in rooms
     )
 
 
@@ -101,12 +102,11 @@ def _member(prim: Usd.Prim, varying: dict[Sdf.Path, bool]) -> Member:
         x = prim.GetAttribute("points").Get() if prim.HasAttribute("points") else None
         four = prim.IsA(UsdGeom.Mesh) and x is not None and len(x) == 4
         layer = "plane" if four else "boundary"
-    outline = layer != "thing" or prim.GetName() == "periodic_box"
     name = found[2] if found else prim.GetName()
     return Member(
         path,
         int(found[1]) if found else None,
-        None if outline else name,
+        None if is_outline(prim) else name,
         layer,
         not _varies(prim, varying),
     )

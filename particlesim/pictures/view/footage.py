@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import threading
-import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import UsdGeom
 
 from ... import validate
 from ...output import colors
-from ...output.usd.recording import PORTION, Recording, quiet
+from ...output.usd.recording import PORTION, Recording, notes, quiet, up_axis
 from ..render.camera import Camera
 from ..render.paint import Paint, field_names, scanned, spanned
 from ..render.stage import look_at
@@ -23,7 +22,6 @@ from .shot import Shot
 
 OWNER = "view"
 LEGEND = 32  # steps of a colour map that the page shows
-SETTLED = 1_000_000_000  # nanoseconds after which a folder's time tells of every change
 WIDE = 16 / 9  # of a page, roughly
 
 
@@ -56,7 +54,6 @@ class Footage:
         self.path, self.take = path, 0
         self._lock = threading.RLock()
         self._recording: Recording | None = None
-        self._written, self._listed = (0, 0), [(0, 0)]
         self._start()
 
     def scene(self) -> dict[str, Any]:
@@ -65,14 +62,13 @@ class Footage:
             stage = self._fresh().stage
             first = look_at(stage, self._first)
             camera = first.camera or Camera.around(first.geometry.box, first.up, WIDE)
-            own = stage.GetRootLayer().customLayerData.get("particlesim", {})
             fps = stage.GetTimeCodesPerSecond() or 24.0
             return {
                 "title": self.path.name,
                 "take": self.take,
                 "frames": self.frames,
                 "fps": fps,
-                "frameTime": own.get("frameTime", 1.0 / fps) if isinstance(own, dict) else 1 / fps,
+                "frameTime": notes(stage).get("frameTime", 1.0 / fps),
                 "up": first.up.tolist(),
                 "floor": first.floor,
                 "camera": {
@@ -121,8 +117,9 @@ class Footage:
         """The range that a colour map should span for a value, by a few frames of all."""
         with self._lock, quiet():
             self.check_field(name)
-            good = [frame for frame in scanned(self.frames) if not self._damaged(frame)]
-            return spanned(self._fresh().stage, name, good)
+            recording = self._fresh()
+            good = [frame for frame in scanned(self.frames) if not recording.damaged(frame)]
+            return spanned(recording.stage, name, good)
 
     def check_field(self, name: str) -> None:
         """Refuse a name that there are no values of."""
@@ -133,29 +130,19 @@ class Footage:
         written = _modified(self.path)
         with quiet():
             self._recording = recording = Recording(OWNER, self.path)
-            self._folders = {
-                clip.path.parent for each in recording.clip_sets for clip in each.clips
-            }
-            self._listed = self._folder_times()
+            self._clips = {str(clip.path): clip.frame for clip in recording.clips}
             self.frames = recording.frames() or [0.0]
             self.cast = cast.cast(recording.stage)
         self.worlds = sorted({m.world for m in self.cast if m.world is not None})
         self._shifts: dict[int, np.ndarray] | None = None
         self._known, self._read, self._written = set(self.frames), 0, written
 
-    def _folder_times(self) -> list[tuple[int, int]]:
-        return [_modified(folder) for folder in sorted(self._folders)]
-
     def _list(self) -> None:
-        """Look for clips that have come, where a folder has changed."""
-        times = self._folder_times()
-        # What comes at once after a look may leave the time as it was: clocks of files are coarse.
-        settled = time.time_ns() - max(times, default=(0, 0))[0] > SETTLED
-        if times == self._listed and settled:
-            return
-        clips = [clip for each in self._fresh().clip_sets for clip in each.clips]
-        there = {clip.frame for clip in clips if clip.path.is_file()}
-        self._listed, self.frames = times, sorted(there) or self.frames
+        """Look which clips have come: whole folders, for there may be many."""
+        folders = filter(os.path.isdir, {os.path.dirname(path) for path in self._clips})
+        there = {file.path for folder in folders for file in os.scandir(folder)}
+        found = {frame for path, frame in self._clips.items() if path in there}
+        self.frames = sorted(found) or self.frames
 
     def _fresh(self, frame: float | None = None) -> Recording:
         """The recording, opened anew where it has to be.
@@ -193,21 +180,18 @@ class Footage:
                 f"{OWNER}: frame must be from {self.frames[0]:g} to {self.frames[-1]:g}, "
                 f"got {frame:g}; choose one that is there."
             )
-        damaged = self._damaged(frame)
+        damaged = self._fresh().damaged(frame)
         if damaged:
             raise validate.fail(
                 OWNER, f"frame {frame:g}", "have a file that can be read to its end",
                 damaged.name, "record it again, or go on with run --resume",
             )  # fmt: skip
 
-    def _damaged(self, frame: float) -> Path | None:
-        """A file of a frame that cannot be read, as one that was cut off."""
-        return self._fresh().damaged(frame)
-
     @property
     def _first(self) -> float:
         """The first frame that can be read."""
-        return next((f for f in self.frames if not self._damaged(f)), self.frames[0])
+        recording = self._fresh()
+        return next((f for f in self.frames if not recording.damaged(f)), self.frames[0])
 
     def _places(self) -> dict[int, np.ndarray]:
         """Where worlds go that are in one place; as the first frame needs it."""
@@ -219,8 +203,7 @@ class Footage:
                     if member.world == world:
                         shot.add(member, None)
                 boxes[world] = shot.box if shot.box is not None else np.zeros((2, 3))
-            up = np.eye(3)[2 if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else 1]
-            self._shifts = cast.side_by_side(boxes, up)
+            self._shifts = cast.side_by_side(boxes, up_axis(stage))
         return self._shifts
 
 

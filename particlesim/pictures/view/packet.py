@@ -52,19 +52,6 @@ def packed(frame: float, layers: Mapping[str, Geometry], edges: np.ndarray) -> b
     return b"".join([struct.pack("<I", len(text)), text, *blocks])
 
 
-def unpacked(packet: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Header and arrays of a packet, by name."""
-    size = 4 + struct.unpack_from("<I", packet)[0]
-    header = json.loads(packet[4:size])
-    dtypes = {name: code for code, name in FORMATS.items()}
-    arrays = {}
-    for name, each in header["arrays"].items():
-        shape = each["count"], each["width"]
-        at, dtype = size + each["offset"], dtypes[each["type"]]
-        arrays[name] = np.frombuffer(packet, dtype, shape[0] * shape[1], at).reshape(shape)
-    return header, arrays
-
-
 def _arrays(
     layers: Mapping[str, Geometry], edges: np.ndarray
 ) -> Iterator[tuple[str, np.ndarray, dict[str, Any]]]:

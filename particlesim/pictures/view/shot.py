@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 from pxr import Usd, UsdGeom
 
@@ -55,15 +53,10 @@ class Shot:
     def box(self) -> np.ndarray | None:
         """Lower and upper corner of all but planes, (2, 3) [length]."""
         found = [self.layers[name].box_of(*SHAPES) for name in ("thing", "boundary")]
-        return joined(box for box in found if box is not None and np.isfinite(box).all())
-
-
-def joined(boxes: Iterable[np.ndarray]) -> np.ndarray | None:
-    """The box around boxes, (2, 3); None of none."""
-    corners = np.array(list(boxes))
-    if not len(corners):
-        return None
-    return np.array([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
+        corners = np.array([box for box in found if box is not None and np.isfinite(box).all()])
+        if not len(corners):
+            return None
+        return np.array([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
 
 
 def _edges(prim: Usd.Prim, pose: np.ndarray, time: Usd.TimeCode) -> np.ndarray:

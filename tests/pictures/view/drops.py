@@ -2,13 +2,14 @@
 
 import http.client
 import json
+import struct
 import time
 
 import numpy as np
 
 import particlesim as ps
 from particlesim.output import colors
-from particlesim.pictures.view.packet import unpacked
+from particlesim.pictures.view.packet import FORMATS
 
 FRAMES, WORLDS, DROPS = 6, 4, 8
 COLOR = (0.1, 0.4, 0.9)
@@ -58,6 +59,19 @@ def get(server, path, method="GET"):
     status, kind, body = ask(server, path, method)
     assert (status, kind) == (200, "application/json"), body
     return json.loads(body)
+
+
+def unpacked(packet):
+    """Header and arrays of a packet, by name."""
+    size = 4 + struct.unpack_from("<I", packet)[0]
+    header = json.loads(packet[4:size])
+    dtypes = {name: code for code, name in FORMATS.items()}
+    arrays = {}
+    for name, each in header["arrays"].items():
+        shape = each["count"], each["width"]
+        at, dtype = size + each["offset"], dtypes[each["type"]]
+        arrays[name] = np.frombuffer(packet, dtype, shape[0] * shape[1], at).reshape(shape)
+    return header, arrays
 
 
 def packet(server, path):

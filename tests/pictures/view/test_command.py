@@ -12,7 +12,8 @@ import threading
 import pytest
 
 from particlesim import cli
-from particlesim.pictures.view.packet import unpacked
+
+from .drops import unpacked
 
 
 def start(*arguments):
