@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
+from particlesim.output.surface.surface import LEVEL
 
 RATIO = 1.3  # h over the spacing
 SMOOTH = [0.0, 0.25, 0.5, 0.75, 1.0]
@@ -90,6 +91,29 @@ def test_a_box_is_as_large_as_its_particles(mesh_of, lattice, assert_whole):
             assert ends[0] == pytest.approx(0, abs=0.02) and ends[-1] == pytest.approx(
                 size, abs=0.02
             )
+
+
+@pytest.mark.parametrize("threshold", [None, 0.3])
+def test_a_plain_surface_is_the_level_of_the_colour_field(mesh_of, simulated, lattice, threshold):
+    x, reach = lattice(6, 5, 4, jitter=0.3), 2 * RATIO
+
+    def spline(a, b):
+        """The cubic spline of support 1, over its value at 0, of all pairs."""
+        u = np.linalg.norm(a[:, None] - b[None], axis=2) / reach
+        outer = 2 * np.maximum(1 - u, 0) ** 3
+        return np.where(u < 0.5, 1 - 6 * u**2 + 6 * u**3, outer)
+
+    volume = 1 / spline(x, x).sum(axis=1)
+    worst = []
+    for spacing in (0.4, 0.2):
+        surface = ps.Surface(simulated(x), spacing=spacing, threshold=threshold, smooth=0)
+        points = surface.mesh()[0].astype(float)
+        rest = np.abs(spline(points, x) @ volume - (threshold or LEVEL))
+        worst.append(rest.max())
+        # Points lie on their edge as if phi were straight there: less than spacing^2 / 8 times its
+        # second derivative, of which one particle has 12 / reach^2 V at most, and few are close.
+        assert rest.max() < spacing**2 / 8 * 12 / reach**2
+    assert worst[1] < 0.4 * worst[0]  # of second order
 
 
 def test_smoothing_takes_bumps_off_a_rough_face(mesh_of, lattice):

@@ -85,6 +85,7 @@ export class Screen {
 
   draw({ boundaries, grid }, samples) {
     if (!this.packets.still) return;
+    this.resized();
     const { up, floor } = this.scene;
     const box = this.box;
     const lowest = box[0].reduce((s, x, k) => s + x * up[k], 0);
