@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..output.progress import Meter, bar
+from ..output.progress import Meter
 from .scene_files import label, load_scene
 from .shell import (
     Debug,
@@ -105,13 +105,14 @@ def stress(
     debug: Debug = False,
 ) -> None:
     """Run a scene at the extremes, and say where it held, refused, recovered or failed."""
-    with one_line_errors(Meter(), debug):
+    meter = Meter()
+    with one_line_errors(meter, debug):
         from . import stress as command
 
         if not debug:
             start_warp_quietly()
         module = load_scene(scene)
-        with bar(label(module), "cases") as show:
+        with meter.count(label(module), "cases") as show:
             table = command.sweep(
                 module, options or (), show,
                 frames=frames, tolerance=tolerance, device=device, worlds=worlds,

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from .. import validate
-from ..output.progress import Meter, bar
+from ..output.progress import Meter
 from ..pictures.render import film, image
 from ..pictures.render.camera import FIELD_OF_VIEW, Camera
 from ..pictures.render.stage import View
@@ -171,12 +171,10 @@ def _pictures(
 
 def _counted(pictures: Iterable[np.ndarray], count: int, meter: Meter) -> Iterator[np.ndarray]:
     """The pictures, with a bar on a terminal."""
-    meter.frames = count
-    with bar("render", "frames") as show:
-        for picture in pictures:
+    with meter.count("render") as show:
+        for done, picture in enumerate(pictures, start=1):
             yield picture
-            meter.done += 1
-            show(meter.done, count, "drawing")
+            show(done, count, "drawing")
 
 
 def _chosen(request: Request, there: list[float]) -> list[float]:

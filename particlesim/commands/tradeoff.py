@@ -10,9 +10,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from ..accuracy.judging import ERRORS
 from ..accuracy.tradeoff import output, plot
-from ..accuracy.tradeoff.bar import bar
-from ..accuracy.tradeoff.sweep import ERRORS, tradeoff
+from ..accuracy.tradeoff.sweep import tradeoff
 from ..accuracy.tradeoff.table import Tradeoff
 from ..output.progress import Meter
 from .scene_files import label, parse_options, split_options
@@ -106,13 +106,9 @@ def sweep(
     # An option that build needs is set by being varied.
     needed = [name for name in inspect.signature(module.build).parameters if name in varied]
     options, knobs = split_options(module, {**{n: varied[n][0] for n in needed}, **fixed})
-    with bar(label(module)) as show, warnings.catch_warnings(record=True) as caught:
+    counted = meter.count(label(module), at_last="reference")
+    with counted as progress, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-
-        def progress(done: int, total: int) -> None:
-            meter.done, meter.frames = done, total
-            show(done, total)
-
         table = tradeoff(
             module.build,
             varied,

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from types import ModuleType
 from typing import Any
 
-from ..accuracy.tradeoff.sweep import ERRORS
+from ..accuracy.judging import ERRORS
 from ..accuracy.tune.report import Trial, Tuned
 from ..accuracy.tune.tuning import tune
 from ..output.progress import Meter

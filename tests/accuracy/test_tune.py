@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from particlesim.accuracy.tradeoff.plan import Study
+from particlesim.accuracy.reference import settled
+from particlesim.accuracy.study import Study
 from particlesim.accuracy.tune.bench import Bench
-from particlesim.accuracy.tune.reference import settled
 from particlesim.accuracy.tune.report import Trial, line
 from particlesim.accuracy.tune.search import Search, levels
 
@@ -136,7 +136,7 @@ def test_levels():
 
 
 def test_reference_is_exact_to_a_tenth_of_the_tolerance():
-    study = Study(oscillator, ps.Settings(dt=0.1), {}, 4, "cpu")
+    study = Study("test", oscillator, ps.Settings(dt=0.1), frames=4, device="cpu")
     for integrator in ("symplectic_euler", "velocity_verlet"):
         x = settled(study, {"substeps": 4, "integrator": integrator}, 1e-3)
         # Of two particles one is exact: rms over both.
@@ -152,7 +152,7 @@ def test_a_reference_that_does_not_settle_says_so():
         scene.add_interaction(ps.Gravity(softening=0.1))
         return scene
 
-    study = Study(chaos, ps.Settings(dt=0.1), {}, 2, "cpu")
+    study = Study("test", chaos, ps.Settings(dt=0.1), frames=2, device="cpu")
     with pytest.warns(UserWarning, match="must change by less than"):
         settled(study, {"substeps": 2}, 1e-6)
 
@@ -244,7 +244,7 @@ def test_what_cannot_be_met_is_refused(refused):
 
 
 def test_the_bench_tries_a_setting_once():
-    study = Study(oscillator, ps.Settings(dt=0.1), {}, 4, "cpu")
+    study = Study("test", oscillator, ps.Settings(dt=0.1), frames=4, device="cpu")
     bench = Bench([study], swung, [None])
     first = bench.trial({"substeps": 5})
     assert bench.trial({"substeps": 5}) is first and len(bench.trials) == 1
@@ -302,7 +302,7 @@ def reference_of(name, module, frames, options, tolerance):
     """Positions at the end, or None where the answer is known."""
     if name == "pendulum":
         return None
-    study = Study(module.build, module.settings, options, frames, "cpu")
+    study = Study("test", module.build, module.settings, options, frames, "cpu")
     forces = not module.build(**options).constraints
     finest = {"integrator": "velocity_verlet"} if forces else {"iterations": 8}
     return settled(study, {"substeps": 2 * module.settings.substeps, **finest}, tolerance)
