@@ -13,6 +13,7 @@ from typing import Any
 from .. import validate
 from ..engine import batch
 from ..instruments.stability.check import automatic
+from ..output.progress import label
 from ..scene.scene import Scene
 from ..scene.settings import Settings
 from ..simulation.simulation import Simulation
@@ -81,8 +82,7 @@ class Study:
 
     def seeded(self, count: int) -> list[Study]:
         """This study with other seeds too, where ``build`` has them and none is given."""
-        parameter = inspect.signature(self.build).parameters.get(SEED)
-        first = None if parameter is None else parameter.default
+        first = options_of(self.build).get(SEED)
         if SEED in self.options or not isinstance(first, int):
             return [self]
         others = []
@@ -160,10 +160,13 @@ class Study:
         return automatic(self.scenes(options), settings, self.device)
 
 
-def label(source: Any) -> str:
-    """What a module or a function of scenes is called, without where it is from."""
-    name = getattr(source, "__name__", "scene")
-    return name.rpartition(".")[2].removeprefix("scene_")
+def options_of(build: Callable[..., Any]) -> dict[str, Any]:
+    """The options of ``build`` by name, and their defaults, or ``inspect.Parameter.empty``."""
+    return {
+        name: each.default
+        for name, each in inspect.signature(build).parameters.items()
+        if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY)
+    }
 
 
 def split(
@@ -188,13 +191,12 @@ def split(
     Raises:
         ValueError: A name that is neither, or no number where there is to be one.
     """
-    parameters = inspect.signature(build).parameters.values()
-    named = {p.name: p for p in parameters if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)}
-    takes_any = any(each.kind == each.VAR_KEYWORD for each in parameters)
+    named = options_of(build)
+    kinds = {each.kind for each in inspect.signature(build).parameters.values()}
     options, chosen = {}, {}
     for name, value in values.items():
         if name in named:
-            default = named[name].default
+            default = named[name]
             if isinstance(default, int | float) and isinstance(value, no_numbers):
                 kind = "true or false" if isinstance(default, bool) else "a number"
                 raise ValueError(
@@ -203,7 +205,7 @@ def split(
             options[name] = value
         elif name in knobs:
             chosen[name] = value
-        elif takes_any:
+        elif inspect.Parameter.VAR_KEYWORD in kinds:
             options[name] = value
         else:
             what = f"an option of {scene} ({', '.join(named) or 'none'})"

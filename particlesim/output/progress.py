@@ -8,6 +8,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 
+def label(source: Any) -> str:
+    """What a module or a function of scenes is called in reports: without where it is from."""
+    name = getattr(source, "__name__", "scene")
+    return name.rpartition(".")[2].removeprefix("scene_")
+
+
 class Meter:
     """Counts frames, or whatever is done one by one, and measures the rate of frames."""
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-import particlesim
 from particlesim import cli
 from particlesim.commands import run, scene_files, shell
+from particlesim.scene import __version__
 
 SCENE = '''
     """A test scene.
@@ -58,7 +58,7 @@ class Engine:
 
 @pytest.fixture
 def engine(monkeypatch):
-    monkeypatch.setattr(particlesim, "Simulation", Engine, raising=False)
+    monkeypatch.setattr("particlesim.simulation.simulation.Simulation", Engine)
     monkeypatch.setattr(Engine, "failure", None)
     monkeypatch.setattr(Engine, "last", None)
     return Engine
@@ -296,7 +296,7 @@ def test_debug_shows_the_traceback(engine, scene_file, capsys):
 
 def test_version(capsys):
     assert cli.main(["--version"]) == 0
-    assert capsys.readouterr().out == f"particlesim {particlesim.__version__}\n"
+    assert capsys.readouterr().out == f"particlesim {__version__}\n"
 
 
 @pytest.mark.parametrize("arguments", [[], ["--help"]])
