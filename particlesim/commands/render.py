@@ -23,7 +23,6 @@ from .shell import (
     Device,
     Options,
     Overwrite,
-    UsdOrScene,
     load,
     opened,
     simulation,
@@ -33,6 +32,7 @@ from .shell import (
 OWNER = "render"
 ENGINES = ("warp", "cycles")
 
+File = Annotated[str, typer.Argument(metavar="FILE", help="A recording, any USD file, or a scene.")]
 Out = Annotated[Path, typer.Option(help="Picture, .png, .jpg, .webp; or film, .gif, .mp4.")]
 Frame = Annotated[
     int | None, typer.Option(help="Of a picture. Default: the last; of a scene, the first.")
@@ -64,7 +64,7 @@ Interpreter = Annotated[
 
 
 def render(
-    file: UsdOrScene,
+    file: File,
     out: Out,
     frame: Frame = None,
     frames: Frames = None,

@@ -47,9 +47,6 @@ Debug = Annotated[bool, typer.Option("--debug", hidden=True, help="Show tracebac
 Color = Annotated[
     str | None, typer.Option(metavar="NAME", help="Colour by this value, as density or speed.")
 ]
-UsdOrScene = Annotated[
-    str, typer.Argument(metavar="FILE", help="A recording, any USD file, or a scene.")
-]
 
 
 @contextlib.contextmanager

@@ -24,7 +24,6 @@ from .shell import (
     Options,
     Precision,
     Substeps,
-    UsdOrScene,
     Worlds,
     load,
     opened,
@@ -37,7 +36,9 @@ PORTS = 65535
 
 
 def view(
-    file: UsdOrScene,
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="A recording, any USD file, or a scene to run.")
+    ],
     port: Annotated[int, typer.Option(help="Port of the page. Default: any that is free.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open a browser, or only say where.")] = True,
     color: Color = None,
