@@ -8,8 +8,9 @@ import sys
 import pytest
 
 import particlesim as ps
-from particlesim.accuracy.tradeoff.output import amount
-from particlesim.accuracy.tradeoff.table import Row, Tradeoff
+from particlesim.accuracy.table import amount
+from particlesim.accuracy.tradeoff.row import Row
+from particlesim.accuracy.tradeoff.table import Tradeoff
 
 
 def row(error, cost, cause="", **values):

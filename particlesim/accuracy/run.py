@@ -1,4 +1,4 @@
-"""Run: one setting of a sweep while it is measured."""
+"""Run: one way to simulate a scene, while it is measured."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from typing import Any
 
 import warp as wp
 
-from ...engine.execution.executors import Executor
-from ...instruments.watchdog.incident import SimulationError
-from ...simulation.simulation import Simulation
-from .plan import Plan
+from ..engine.execution.executors import Executor
+from ..instruments.watchdog.incident import SimulationError
+from .study import Plan, Study
 
 WARM_UP = 2 * Executor.TRIALS  # frames after which it is chosen how frames are executed
 
@@ -24,8 +23,8 @@ class Run:
     run counts as diverged, and is empty while it does not.
     """
 
-    def __init__(self, plan: Plan, sim: Simulation):
-        self.plan, self.sim = plan, sim
+    def __init__(self, study: Study, plan: Plan):
+        self.study, self.plan, self.sim = study, plan, study.simulation(plan)
         self.costs: list[float] = []
         self.cause, self.error = "", math.nan
         self.notes: dict[str, Any] = {}  # what the error needs to remember

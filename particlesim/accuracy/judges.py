@@ -1,4 +1,4 @@
-"""Errors of the runs of a sweep: a known answer, or conservation drift."""
+"""Errors of runs: a known answer, or conservation drift."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from .plan import OWNER
 from .run import Run
 
 
@@ -60,10 +59,10 @@ class Known(Judge):
         ended = [run for run in runs if run.notes.get("ended")]
         if ended and all(run.cause for run in ended):
             warnings.warn(
-                f"{OWNER}: error must be finite for one setting at least, got "
+                f"{ended[0].study.owner}: error must be finite for one setting at least, got "
                 f"{ended[0].error} for all that reached t = {ended[0].sim.time:g}; choose frames "
                 "for which the answer is known, or another error.",
-                stacklevel=4,
+                stacklevel=5,
             )
 
     def describe(self) -> str:

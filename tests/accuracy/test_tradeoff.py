@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from particlesim.accuracy.tradeoff.plan import Study
-from particlesim.accuracy.tradeoff.run import array_bytes
+from particlesim.accuracy.run import Run, array_bytes
+from particlesim.accuracy.study import Study
 
 EXACT = ps.Settings(dt=0.1, precision="float64")
 
@@ -70,12 +70,10 @@ def test_a_sweep(device):
 
 
 def test_settings_run_in_turn(monkeypatch):
-    from particlesim.accuracy.tradeoff import run
-
     order = []
-    advance = run.Run.advance
+    advance = Run.advance
     monkeypatch.setattr(
-        run.Run, "advance",
+        Run, "advance",
         lambda self, *rest: (order.append(self.plan.values["substeps"]), advance(self, *rest))[1],
     )  # fmt: skip
     sweep(repeats=3)
@@ -128,11 +126,11 @@ def test_an_error_that_is_not_finite():
 def test_it_starts_with_what_the_module_says():
     from particlesim.scenes import three_body
 
-    study = Study(three_body.build, None, None, None, "cpu")
+    study = Study("test", three_body.build)
     assert (study.label, study.settings, study.frames) == ("three_body", three_body.settings, 200)
     assert study.known is three_body.error and study.known_here
-    assert not Study(three_body.build, None, None, 100, "cpu").known_here
-    study = Study(fall, None, None, None, "cpu")
+    assert not Study("test", three_body.build, frames=100).known_here
+    study = Study("test", fall)
     assert (study.label, study.settings, study.known) == ("fall", ps.Settings(), None)
 
 

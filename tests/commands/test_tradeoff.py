@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from particlesim import cli
-from particlesim.commands.tradeoff import parse_vary
+from particlesim.commands.scene_files import parse_vary
 
 SCENE = """
 import particlesim as ps
