@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .. import validate
-from ..engine import batch
+from ..engine.model import batch
 from ..instruments.stability.check import automatic
 from ..output.progress import label
 from ..scene.scene import Scene
@@ -147,7 +147,7 @@ class Study:
 
     def scenes(self, options: Mapping[str, Any]) -> list[Scene]:
         """The scenes, one a world."""
-        return batch.scenes(self.build(**options), self.worlds)
+        return batch(self.build(**options), self.worlds)
 
     def simulation(self, plan: Plan) -> Simulation:
         """A simulation of a plan, at its start."""
