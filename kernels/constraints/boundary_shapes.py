@@ -1,15 +1,13 @@
-"""Shapes of boundaries: how far, and along which normals, a particle is to be brought back.
+"""Surfaces of boundaries: how far, and along which normals, a particle is to be brought back.
 
-A shape is a Warp function ``sides(x, e, R, slack, p) -> (back, N)``: of a particle of radius R at
+A surface is a Warp function ``sides(x, e, R, slack, p) -> (back, N)``: of a particle of radius R at
 x + e (e is small, and may be what rounding keeps from x) the way back to each side, at least 0, and
 the unit normals of the sides, (sides, 3), towards where particles may be. ``slack`` forgives an
-overlap on each side; ``p`` are the shape's parameters. Where there is no room for the particle, the
-middle is right.
+overlap on each side; ``p`` are the surface's parameters. Where there is no room for the particle,
+the middle is right.
 """
 
 import functools
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import warp as wp
@@ -17,26 +15,16 @@ import warp as wp
 from ..precision import Precision, function
 
 
-@dataclass(frozen=True)
-class Shape:
-    """A shape: at most how many sides a particle can touch at once, and what makes its function."""
-
-    sides: int
-    function: Callable[[Precision, Any], wp.Function]
-
-    def each(self, precision: Precision) -> Any:
-        """Type of one number a side."""
-        return precision.vector(self.sides)
-
-    def normals(self, precision: Precision) -> Any:
-        """Type of one normal a side."""
-        return wp.types.matrix(shape=(self.sides, 3), dtype=precision.scalar)
+def normals_type(precision: Precision, sides: int) -> Any:
+    """One normal for each side."""
+    return wp.types.matrix(shape=(sides, 3), dtype=precision.scalar)
 
 
+@functools.cache
 def plane_function(precision: Precision, params: Any) -> wp.Function:
     """The half space (x - point) . n >= R."""
     vec3, real = precision.vec3, precision.scalar
-    each, normals = PLANE.each(precision), PLANE.normals(precision)
+    each, normals = precision.vector(1), normals_type(precision, 1)
 
     def plane_sides(x: vec3, e: vec3, R: real, slack: each, p: params):
         d = x - p.point + e
@@ -48,10 +36,11 @@ def plane_function(precision: Precision, params: Any) -> wp.Function:
     return function(plane_sides)
 
 
+@functools.cache
 def sphere_function(precision: Precision, params: Any) -> wp.Function:
     """The inside of a sphere, |x - center| <= radius - R, or its outside, >= radius + R."""
     vec3, real = precision.vec3, precision.scalar
-    each, normals = SPHERE.each(precision), SPHERE.normals(precision)
+    each, normals = precision.vector(1), normals_type(precision, 1)
 
     def sphere_sides(x: vec3, e: vec3, R: real, slack: each, p: params):
         d = x - p.center + e
@@ -70,10 +59,11 @@ def sphere_function(precision: Precision, params: Any) -> wp.Function:
     return function(sphere_sides)
 
 
+@functools.cache
 def box_function(precision: Precision, params: Any) -> wp.Function:
     """The inside of a box, lower + R <= x <= upper - R; infinite sides are open."""
     vec3, real = precision.vec3, precision.scalar
-    each, normals = BOX.each(precision), BOX.normals(precision)
+    each, normals = precision.vector(3), normals_type(precision, 3)
 
     def outside(x: real, e: real, lower: real, upper: real, radius: real, slack: real):
         """Way back between the two sides of an axis."""
@@ -98,8 +88,3 @@ def box_function(precision: Precision, params: Any) -> wp.Function:
         return back, N
 
     return function(box_sides)
-
-
-PLANE = Shape(1, functools.cache(plane_function))
-SPHERE = Shape(1, functools.cache(sphere_function))
-BOX = Shape(3, functools.cache(box_function))

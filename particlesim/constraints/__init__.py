@@ -1,6 +1,6 @@
 """Constraints: what projects positions after integration."""
 
-from .boundary import BoxBoundary, PlaneBoundary, SphereBoundary
+from .boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
 from .constraint import Constraint
 from .contact import Contact
 from .distance import Distance

@@ -1,242 +1,197 @@
-"""Boundaries that hold particles off by their radius: planes, boxes and spheres."""
+"""What all boundaries share: particles held off by their radius, friction, bounces, motion."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import warp as wp
 
 from .. import validate
+from ..engine.execution.launch import call, launch
 from ..engine.model import Model
-from ..engine.probing.limit import Limit
-from ..engine.probing.probe import Probe
-from ..kernels.constraints import boundary_shapes
-from .boundary_base import STILL, Boundary
-from .limits import box_limits, sphere_limits
+from ..engine.neighbors.lists import Neighbors
+from ..engine.state import State
+from ..kernels.constraints import boundary as kernels
+from ..kernels.constraints.rigid_motion import motion_type, pose_kernel, pose_type
+from ..kernels.precision import Precision
+from .easing import EasedConstraint, Easing
+from .tuples import bodies
+
+STILL = (0.0, 0.0, 0.0)
 
 
-class PlaneBoundary(Boundary):
-    """The half space (x - point) . n >= R, on the side that the normal points to.
+class Boundary(EasedConstraint):
+    """Base of boundaries: a member is its shape, the attributes that make it, and its pivot.
 
-    Args:
-        point: A point of the plane [length], (3,); it turns about this one.
-        normal: n, into the half space that is open to particles, (3,); any length but 0.
-        friction: mu, at least 0.
-        restitution: e, 0 to 1: speed after over speed before, both against the plane's.
-        group: Which particles it holds; None: all.
-        velocity: Of the plane, (3,) [length/time]: along the normal a piston, across it a
-            conveyor belt, which stays where it is.
-        angular_velocity: About the point, (3,) [rad/time]: along the normal a turntable.
+    Particles are held off by their radius, C >= 0 with nothing to soften it. Friction takes back
+    the tangential way of the substep against the surface, up to mu times the normal correction
+    (Macklin et al. 2014, eq. 24); restitution sets the normal velocity against the surface's after
+    the solve (Mueller et al. 2020, eq. 34). What starts outside is brought in at no more than
+    ``Settings.depenetration_speed``.
 
-    Raises:
-        ValueError: Values out of range; a normal along a periodic axis.
-
-    Example:
-        >>> ground = PlaneBoundary((0, 0, 0), (0, 2, 0), friction=0.5)
-        >>> ground.normal.tolist()
-        [0.0, 1.0, 0.0]
-        >>> piston = PlaneBoundary((0, 0, 0), (0, 1, 0), velocity=(0, 0.5, 0))
-        >>> piston.pose(time=2.0)[0].tolist()
-        [0.0, 1.0, 0.0]
+    A boundary moves as a rigid body from where it is described, by its world's clock: place and
+    turn at time t are exact, however many substeps led there.
     """
 
-    shape = boundary_shapes.PLANE
-    geometry = ("point", "normal")
+    requires = frozenset({"position", "velocity", "inverse_mass", "radius", "correction"})
+    sides = 1  # at most how many of them a particle touches at once
+    geometry: tuple[str, ...]  # attributes that go into the kernels' parameters
 
     def __init__(
         self,
-        point: Sequence[float],
-        normal: Sequence[float],
-        friction: float = 0.0,
-        restitution: float = 0.0,
-        group: Any = None,
-        *,
-        velocity: Sequence[float] = STILL,
-        angular_velocity: Sequence[float] = STILL,
+        friction: float,
+        restitution: float,
+        group: Any,
+        velocity: Sequence[float],
+        angular_velocity: Sequence[float],
     ):
-        super().__init__(friction, restitution, group, velocity, angular_velocity)
-        self.point = validate.vector(self.name, "point", point, unit="length")
-        given = validate.vector(self.name, "normal", normal)
-        longest = np.abs(given).max()
-        if not longest > 0:
-            raise validate.fail(
-                self.name, "normal", "have a direction", given, "point it to where particles are"
-            )
-        scaled = given / longest  # so that squares neither overflow nor vanish
-        self.normal = scaled / np.linalg.norm(scaled)
+        self.group = group
+        self.friction = validate.number(self.name, "friction", friction, minimum=0.0)
+        self.restitution = validate.number(
+            self.name, "restitution", restitution, minimum=0.0, maximum=1.0
+        )
+        self.velocity = validate.vector(self.name, "velocity", velocity, unit="length/time")
+        self.angular_velocity = validate.vector(
+            self.name, "angular_velocity", angular_velocity, unit="rad/time"
+        )
 
-    def shapes(self) -> list[dict[str, Any]]:
-        return [self._drawn("plane", point=self.point, normal=self.normal)]
+    @property
+    def moves(self) -> bool:
+        """Its surface has a velocity."""
+        return bool(self.velocity.any() or self.angular_velocity.any())
+
+    def pose(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Where it is: what is at x as described is at R x + T at ``time``.
+
+        Args:
+            time: Of its world, since the start [time].
+
+        Returns:
+            T, (3,) [length], and R, (3, 3). What moves the shape in itself, as a plane along
+            itself or a sphere about its center, is left out.
+        """
+        travel, turn = self._carried()
+        angle = float(np.linalg.norm(turn)) * time
+        rotation = np.eye(3)
+        if angle != 0.0:
+            cross = np.cross(np.eye(3), turn / np.linalg.norm(turn))
+            rotation += np.sin(angle) * cross + 2 * np.sin(angle / 2) ** 2 * cross @ cross
+        pivot = self._pivot()
+        return travel * time + pivot - rotation @ pivot, rotation
+
+    def _drawn(self, kind: str, **parameters: Any) -> dict[str, Any]:
+        """The shape for recordings, which ask a moving one for its pose."""
+        moving = any(each.any() for each in self._carried())
+        return {"kind": kind, "moving": moving, **parameters}
 
     def _pivot(self) -> np.ndarray:
-        return self.point
+        """What it turns about, as described."""
+        raise NotImplementedError
 
     def _carried(self) -> tuple[np.ndarray, np.ndarray]:
-        n = self.normal
-        if np.cross(n, self.angular_velocity).any():
-            return self.velocity, self.angular_velocity
-        return n * (n @ self.velocity), np.zeros(3)
+        """Velocity and angular velocity, less what moves the shape in itself."""
+        return self.velocity, self.angular_velocity
 
     def _check(self, model: Model, w: int) -> None:
-        turn = self._carried()[1]
-        aside = np.cross(turn, self.normal)
-        swept = np.array([self.normal, aside, np.cross(turn, aside)])  # the normals that it takes
-        if swept[:, list(model.periodic)].any():
-            raise validate.fail(
-                self.name, "normal", "be along the open axes of a periodic scene", self.normal,
-                "leave that axis open",
-            )  # fmt: skip
+        """The shape is fit for world w."""
 
+    def surface(self, precision: Precision) -> wp.Function:
+        """Where it is, as a Warp function (see kernels.constraints.boundary_shapes)."""
+        raise NotImplementedError
 
-class BoxBoundary(Boundary):
-    """The inside of a box: lower + R <= x <= upper - R on each axis.
+    def prepare(self, model: Model, neighbors: Neighbors) -> None:
+        self.model = model
+        for w, peer in enumerate(self.peers):
+            peer._check(model, w)
+        members = model.members([peer.group for peer in self.peers], self.name)
+        self.count = len(members)
+        self.held = kernels.held_type(model.precision, self.sides)()
+        self.held.particle = model.array(members, wp.int32)
+        self.worlds_held = model.world_of[members]
+        self.held.world = model.array(self.worlds_held, wp.int32)
+        names = (*self.geometry, "friction", "restitution")
+        columns = {name: self._column(name) for name in names}
+        self.Params, self.params = model.parameters(f"{type(self).__name__}Parameters", columns)
+        self.rough, self.bouncing = (bool(columns[name].any()) for name in names[-2:])
+        self.moving = any(peer.moves for peer in self.peers)
+        if self.moving:
+            self.requires = self.requires | {"time"}
 
-    Args:
-        lower: Lower corner [length], (3,); -inf leaves a side open.
-        upper: Upper corner [length], (3,), above the lower; inf leaves a side open.
-        friction: mu of all sides, at least 0.
-        restitution: e, 0 to 1: speed after over speed before, both against the side's.
-        group: Which particles it holds; None: all.
-        velocity: Of the box, (3,) [length/time].
-        angular_velocity: About its middle, (3,) [rad/time]; only of a box without open sides.
+    def _column(self, name: str) -> np.ndarray:
+        """An attribute of all worlds; what is true or false as whole numbers."""
+        values = np.array([getattr(peer, name) for peer in self.peers])
+        return values.astype(np.int32) if values.dtype == bool else values
 
-    Raises:
-        ValueError: Values out of range; a side on a periodic axis; an open box that turns.
+    def attach(self, model: Model, state: State) -> None:
+        if not self.count:
+            return
+        device, precision = model.device, model.precision
+        each = precision.vector(self.sides)
+        self.bodies = bodies(model, state)
+        self.easing = Easing(model, self.count, each, ends=1)
+        self.held.radius = state.radius
+        self.held.slack, self.held.marked = self.easing.slack, self.easing.marked
+        if self.rough:
+            self.held.grip = wp.zeros(self.count, dtype=each, device=device)
+        if self.moving:
+            self._attach_motion(state)
+        forces = "force" in state
+        self.force = state.force if forces else wp.empty(0, dtype=precision.vec3, device=device)
+        self.form = kernels.Form(
+            self.surface(precision), self.sides, precision, self.Params, "position_error" in state,
+            self.moving,
+        )  # fmt: skip
+        self.begin_kernel = kernels.begin_kernel(self.form)
+        self.project_kernel = kernels.project_kernel(self.form)
+        self.bounce_kernel = kernels.bounce_kernel(self.form, forces)
 
-    Example:
-        >>> pool = BoxBoundary((0, 0, 0), (4, float("inf"), 1))
-        >>> pool.upper.tolist()
-        [4.0, inf, 1.0]
-        >>> mill = BoxBoundary((-1, -1, -1), (1, 1, 1), friction=0.5, angular_velocity=(0, 0, 2))
-        >>> mill.pose(time=np.pi / 4)[1].round(6).tolist()
-        [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
-    """
+    def _attach_motion(self, state: State) -> None:
+        """The motions of all worlds, and room for where they have led."""
+        model = self.model
+        carried = [peer._carried() for peer in self.peers]
+        columns = {
+            "velocity": [peer.velocity for peer in self.peers],
+            "spin": [peer.angular_velocity for peer in self.peers],
+            "travel": [travel for travel, _ in carried],
+            "turn": [turn for _, turn in carried],
+            "pivot": [peer._pivot() for peer in self.peers],
+        }
+        self.motion = model.structures(
+            motion_type(), {name: np.array(rows) for name, rows in columns.items()}
+        )
+        self.clock = state.time
+        self.held.pose = wp.zeros(
+            model.world_count, dtype=pose_type(model.precision), device=model.device
+        )
 
-    shape = boundary_shapes.BOX
-    geometry = ("lower", "upper")
+    def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
+        return self.worlds_held if name == "slack" else super().worlds(name, array)
 
-    def __init__(
-        self,
-        lower: Sequence[float],
-        upper: Sequence[float],
-        friction: float = 0.0,
-        restitution: float = 0.0,
-        group: Any = None,
-        *,
-        velocity: Sequence[float] = STILL,
-        angular_velocity: Sequence[float] = STILL,
-    ):
-        super().__init__(friction, restitution, group, velocity, angular_velocity)
-        self.lower = self._corner("lower", lower, -np.inf)
-        self.upper = self._corner("upper", upper, np.inf)
-        if not (self.lower < self.upper).all():
-            raise validate.fail(
-                self.name, "upper", f"be above lower {self.lower.tolist()} [length]", self.upper,
-                "swap the corners",
-            )  # fmt: skip
-        closed = np.isfinite(self.lower) & np.isfinite(self.upper)
-        if self.angular_velocity.any() and not closed.all():
-            raise validate.fail(
-                self.name, "angular_velocity", "be 0 where sides are open, as there is no middle",
-                self.angular_velocity, "close the box, or turn planes",
-            )  # fmt: skip
+    def _launch(self, kernel: wp.Kernel, *inputs: Any) -> None:
+        everything = [self.params, self.held, self.bodies, *inputs]
+        launch(kernel, self.count, everything, self.model.device)
 
-    def _corner(self, name: str, value: Any, open_side: float) -> np.ndarray:
-        sides = np.asarray(value, dtype=np.float64) if np.shape(value) == (3,) else None
-        opened = np.zeros(3, dtype=bool) if sides is None else sides == open_side
-        # The open sides are the only values that may be infinite.
-        finite = value if sides is None else np.where(opened, 0.0, sides)
-        corner = validate.vector(self.name, name, finite, unit="length")
-        return np.where(opened, open_side, corner)
+    def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        if not self.count or dt <= 0:
+            return
+        if self.moving:
+            # The clock goes with the positions: this is where the substep ends.
+            model = self.model
+            inputs = [self.motion, self.clock, self.held.pose]
+            launch(pose_kernel(model.precision), model.world_count, inputs, model.device)
+        # A static projection goes by the radii as they are, and leaves the marks to the first step.
+        if dt < math.inf:
+            self._launch(self.begin_kernel, self.easing.struct, dt)
+            call(self.easing.unmark)
 
-    def shapes(self) -> list[dict[str, Any]]:
-        return [self._drawn("box", lower=self.lower, upper=self.upper)]
+    def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        if self.count and dt > 0:
+            timed = dt < math.inf
+            self._launch(self.project_kernel, float(timed), dt if timed else 0.0)
 
-    def limits(self, probe: Probe) -> list[Limit]:
-        """By the speed of the particles against the width; half spaces are never passed through."""
-        return box_limits(self, probe)
-
-    def _pivot(self) -> np.ndarray:
-        middle = 0.5 * self.lower + 0.5 * self.upper
-        return middle if self.angular_velocity.any() else np.zeros(3)
-
-    def _carried(self) -> tuple[np.ndarray, np.ndarray]:
-        # Along an axis without sides it moves in itself.
-        sided = np.isfinite(self.lower) | np.isfinite(self.upper)
-        return np.where(sided, self.velocity, 0.0), self.angular_velocity
-
-    def _check(self, model: Model, w: int) -> None:
-        for axis, on in enumerate(model.periodic):
-            if on and (np.isfinite(self.lower[axis]) or np.isfinite(self.upper[axis])):
-                raise validate.fail(
-                    self.name, f"sides along {'xyz'[axis]}", "be open where the scene is periodic",
-                    [float(self.lower[axis]), float(self.upper[axis])], "use -inf and inf",
-                )  # fmt: skip
-
-
-class SphereBoundary(Boundary):
-    """The inside of a sphere, |x - center| <= radius - R, or its outside, >= radius + R.
-
-    From the outside, what crosses the middle of the sphere in one substep leaves on the other side.
-
-    Args:
-        center: Middle of the sphere [length], (3,).
-        radius: Of the sphere [length], above 0.
-        inside: True: a container; False: an obstacle.
-        friction: mu, at least 0.
-        restitution: e, 0 to 1: speed after over speed before, both against the surface's.
-        group: Which particles it holds; None: all.
-        velocity: Of the sphere, (3,) [length/time].
-        angular_velocity: About the center, (3,) [rad/time].
-
-    Raises:
-        ValueError: Values out of range; a periodic scene.
-
-    Example:
-        >>> bowl = SphereBoundary((0, 1, 0), 1.0, friction=0.1)
-        >>> ball = SphereBoundary((0, 0, 0), 0.2, inside=False, velocity=(1, 0, 0))
-        >>> ball.pose(time=3.0)[0].tolist()
-        [3.0, 0.0, 0.0]
-    """
-
-    shape = boundary_shapes.SPHERE
-    geometry = ("center", "radius", "inside")
-
-    def __init__(
-        self,
-        center: Sequence[float],
-        radius: float,
-        inside: bool = True,
-        friction: float = 0.0,
-        restitution: float = 0.0,
-        group: Any = None,
-        *,
-        velocity: Sequence[float] = STILL,
-        angular_velocity: Sequence[float] = STILL,
-    ):
-        super().__init__(friction, restitution, group, velocity, angular_velocity)
-        self.center = validate.vector(self.name, "center", center, unit="length")
-        self.radius = validate.number(self.name, "radius", radius, above=0.0, unit="length")
-        self.inside = bool(inside)
-
-    def shapes(self) -> list[dict[str, Any]]:
-        ball = {"center": self.center, "radius": self.radius, "container": self.inside}
-        return [self._drawn("sphere", **ball)]
-
-    def limits(self, probe: Probe) -> list[Limit]:
-        """By the speed of the particles against the radius."""
-        return sphere_limits(self, probe)
-
-    def _pivot(self) -> np.ndarray:
-        return self.center
-
-    def _carried(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.velocity, np.zeros(3)
-
-    def _check(self, model: Model, w: int) -> None:
-        if any(model.periodic):
-            raise validate.fail(
-                self.name, "scene", "be open along all axes", list(model.periodic),
-                "leave periodic out",
-            )  # fmt: skip
+    def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        if self.count and self.bouncing and dt > 0:
+            self._launch(self.bounce_kernel, self.force, dt, 1.0 / dt)
