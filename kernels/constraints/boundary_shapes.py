@@ -10,14 +10,93 @@ the middle is right.
 import functools
 from typing import Any
 
+import numpy as np
 import warp as wp
 
-from ..precision import Precision, function
+from ..precision import FLOAT64, Precision, function, function_from_source, register
+
+UNIT = 1.0e-3  # a gradient whose length is farther from 1 is not that of a distance
+ASIDE = 32.0  # roundings of a place, from which a gradient is taken once more
 
 
 def normals_type(precision: Precision, sides: int) -> Any:
     """One normal for each side."""
     return wp.types.matrix(shape=(sides, 3), dtype=precision.scalar)
+
+
+@functools.cache
+def measure_function(
+    law: wp.Function, names: tuple[str, ...], precision: Precision, params: Any
+) -> wp.Function:
+    """``measure(x, p) -> (d, g)``: a law's value at x, and its gradient by ``wp.grad``."""
+    call = ", ".join(["x", *(f"p.{name}" for name in names)])
+    derivatives = ", ".join(["g", *(f"unused{n}" for n in range(len(names)))])
+    source = (
+        "def measure(x: Vec3, p: Params):\n"
+        f"    {derivatives} = wp.grad(law)({call})\n"
+        f"    return law({call}), g\n"
+    )
+    namespace = {"wp": wp, "law": law, "Vec3": precision.vec3, "Params": params}
+    return function_from_source(source, namespace)
+
+
+@functools.cache
+def distance_function(
+    law: wp.Function, names: tuple[str, ...], precision: Precision, params: Any
+) -> wp.Function:
+    """A signed distance d(x), positive where particles may be: d / |grad d| >= R.
+
+    That is the distance itself where the gradient has unit length, and its first order elsewhere.
+    A gradient of another length may also be none, as that of the distance from a line on the line:
+    it is taken once more next to x, and the larger one holds. Where there is none at all, the
+    direction is fixed. What is no number makes none of the particle, for the watchdog to find.
+    """
+    vec3, real = precision.vec3, precision.scalar
+    each, normals = precision.vector(1), normals_type(precision, 1)
+    measure = measure_function(law, names, precision, params)
+    rounding = ASIDE * float(np.finfo(precision.numpy).eps)
+
+    def distance_sides(x: vec3, e: vec3, R: real, slack: each, p: params):
+        y = x + e
+        d, g = measure(y, p)
+        steep = wp.length(g)
+        if not wp.abs(steep - real(1.0)) < real(UNIT):
+            away = vec3(real(0.48), real(0.6), real(0.64))
+            near = real(rounding) * (wp.max(wp.abs(y)) + wp.abs(d) + R)
+            _d, other = measure(y + away * near, p)
+            if not wp.length(other) < (real(1.0) + real(UNIT)) * steep:
+                g = other
+                steep = wp.length(g)
+        n = vec3(real(0.0), real(1.0), real(0.0))
+        if steep > real(0.0):
+            n = g / steep
+            d = d / steep
+        back = wp.max(R - slack[0] - (d + wp.dot(n, e - (y - x))), real(0.0))
+        if wp.isnan(d):
+            back = real(1.0)
+            n = vec3(d)
+        N = normals()
+        N[0] = n
+        return each(back), N
+
+    # Emitted behind the gradient.
+    return function(distance_sides, after_gradients=True)
+
+
+@functools.cache
+def distance_kernel(law: wp.Function, names: tuple[str, ...], params: Any) -> wp.Kernel:
+    """Kernel: a signed distance at given points, in double precision."""
+    measure = measure_function(law, names, FLOAT64, params)
+
+    @functools.partial(register, cpu_only=True)
+    def measure_distances(
+        p: params, x: wp.array(dtype=wp.vec3d), d_out: wp.array(dtype=wp.float64)
+    ):
+        k = wp.tid()
+        d, _g = measure(x[k], p)
+        d_out[k] = d
+
+    return measure_distances
 
 
 @functools.cache

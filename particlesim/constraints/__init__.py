@@ -1,5 +1,6 @@
 """Constraints: what projects positions after integration."""
 
+from .boundary import Boundary
 from .boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
 from .constraint import Constraint
 from .contact import Contact
@@ -7,6 +8,7 @@ from .distance import Distance
 from .force import ConstraintForce
 
 __all__ = [
+    "Boundary",
     "BoxBoundary",
     "Constraint",
     "ConstraintForce",

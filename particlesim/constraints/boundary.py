@@ -1,8 +1,7 @@
-"""What all boundaries share: particles held off by their radius, friction, bounces, motion."""
+"""Boundaries: what holds particles off by their radius, from one law, its signed distance."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,44 +9,101 @@ import numpy as np
 import warp as wp
 
 from .. import validate
-from ..engine.execution.launch import call, launch
 from ..engine.model import Model
-from ..engine.neighbors.lists import Neighbors
-from ..engine.state import State
-from ..kernels.constraints import boundary as kernels
-from ..kernels.constraints.rigid_motion import motion_type, pose_kernel, pose_type
-from ..kernels.precision import Precision
-from .easing import EasedConstraint, Easing
-from .tuples import bodies
+from ..engine.structs import parameter_struct
+from ..interactions.arguments import Arguments
+from ..kernels.constraints import boundary_shapes as kernels
+from ..kernels.precision import FLOAT64, Precision
+from ..scene.law import Law
+from ..scene.law import law as make_law
+from .holding import Holding
 
 STILL = (0.0, 0.0, 0.0)
+CELLS = 64  # along the longest side of what is drawn
+PLACES = 4096  # at which a law is asked for its period
+# Arguments of every boundary.
+OWN = frozenset(
+    {"friction", "restitution", "group", "velocity", "angular_velocity", "pivot", "drawn"}
+)
 
 
-class Boundary(EasedConstraint):
-    """Base of boundaries: a member is its shape, the attributes that make it, and its pivot.
+class Boundary(Holding):
+    """What holds particles off by their radius, d(x) >= R, from one law: its signed distance d.
 
-    Particles are held off by their radius, C >= 0 with nothing to soften it. Friction takes back
-    the tangential way of the substep against the surface, up to mu times the normal correction
-    (Macklin et al. 2014, eq. 24); restitution sets the normal velocity against the surface's after
-    the solve (Mueller et al. 2020, eq. 34). What starts outside is brought in at no more than
-    ``Settings.depenetration_speed``.
+    Particles are held with nothing to soften it. Friction takes back the tangential way of the
+    substep against the surface, up to mu times the normal correction (Macklin et al. 2014, eq. 24);
+    restitution sets the normal velocity against the surface's after the solve (Mueller et al. 2020,
+    eq. 34). What starts outside is brought in at no more than ``Settings.depenetration_speed``.
+
+    The normal is the law's gradient, derived. A law whose gradient has another length than 1 is
+    taken as d / |grad d|: near the surface that is a distance as well, to first order. On a place
+    without a gradient, as the axis of a cylinder, the way out is that of a place next to it.
 
     A boundary moves as a rigid body from where it is described, by its world's clock: place and
     turn at time t are exact, however many substeps led there.
+
+    ``PlaneBoundary``, ``BoxBoundary`` and ``SphereBoundary`` are boundaries whose surface is
+    written out, so that they are exact where rounding or a lack of room would tell.
+
+    Args:
+        law: ``d(x, ...)`` [length], positive where particles may be: the first parameter is the
+            place, ``wp.vec3``, the others are given by keyword.
+        friction: mu, at least 0.
+        restitution: e, 0 to 1: speed after over speed before, both against the surface's.
+        group: Which particles it holds; None: all.
+        velocity: Of the boundary, (3,) [length/time].
+        angular_velocity: About the pivot, (3,) [rad/time].
+        pivot: What it turns about, as described, (3,) [length].
+        drawn: ``(lower, upper)`` corners [length] of the box in which recordings draw the surface,
+            as described; None: it is not drawn.
+        **parameters: The law's further parameters: a number each, or (3,) where the law takes a
+            ``wp.vec3``.
+
+    Raises:
+        ValueError: Values out of range; a law that takes no place or cannot be derived; a parameter
+            that is missing; in a periodic scene a law of another period, or one that turns.
+        TypeError: A parameter that the law does not have.
+
+    Example:
+        >>> @law
+        ... def torus(x: wp.vec3, ring: float, tube: float):
+        ...     return wp.length(wp.vec2(wp.length(wp.vec2(x[0], x[2])) - ring, x[1])) - tube
+        >>> wheel = Boundary(torus, friction=0.3, angular_velocity=(1, 0, 0), ring=1.0, tube=0.2)
+        >>> wheel.distance([(0, 0, 0), (1, 0.3, 0)]).round(6).tolist()
+        [0.8, 0.1]
     """
 
-    requires = frozenset({"position", "velocity", "inverse_mass", "radius", "correction"})
-    sides = 1  # at most how many of them a particle touches at once
-    geometry: tuple[str, ...]  # attributes that go into the kernels' parameters
+    law: Law  # of the class, where that has a surface of its own
 
     def __init__(
+        self,
+        law: Any,
+        friction: float = 0.0,
+        restitution: float = 0.0,
+        group: Any = None,
+        *,
+        velocity: Sequence[float] = STILL,
+        angular_velocity: Sequence[float] = STILL,
+        pivot: Sequence[float] = STILL,
+        drawn: tuple[Sequence[float], Sequence[float]] | None = None,
+        **parameters: Any,
+    ):
+        self._holds(friction, restitution, group, velocity, angular_velocity)
+        self.pivot = validate.vector(self.name, "pivot", pivot, unit="length")
+        self.law = make_law(law)
+        self.law.check_derivable(self.name)
+        self.parameters = self._values(parameters)
+        self._box = None if drawn is None else self._corners(drawn)
+
+    def _holds(
         self,
         friction: float,
         restitution: float,
         group: Any,
         velocity: Sequence[float],
         angular_velocity: Sequence[float],
-    ):
+    ) -> None:
+        """What boundaries of every surface are made with."""
         self.group = group
         self.friction = validate.number(self.name, "friction", friction, minimum=0.0)
         self.restitution = validate.number(
@@ -57,6 +113,64 @@ class Boundary(EasedConstraint):
         self.angular_velocity = validate.vector(
             self.name, "angular_velocity", angular_velocity, unit="rad/time"
         )
+
+    def _values(self, given: dict[str, Any]) -> dict[str, Any]:
+        """The law's further parameters."""
+        names = list(self.law.parameters)
+        if not names or self.law.parameters[names[0]] is not wp.vec3:
+            raise validate.fail(
+                self.name, "law", "take a place (wp.vec3) first", self.law.name,
+                "write def law(x: wp.vec3, ...)",
+            )  # fmt: skip
+        for name in OWN & {*names[1:]}:
+            raise validate.fail(
+                self.name, f"parameter {name} of {self.law.name}", "have a name of its own", name,
+                "rename it",
+            )  # fmt: skip
+        values = Arguments(self.name, self.law, 1, given, ()).values
+        for name, value in values.items():
+            check = validate.vector if self.law.parameters[name] is wp.vec3 else validate.number
+            check(self.name, name, value)
+        return values
+
+    def _corners(self, drawn: Any) -> tuple[np.ndarray, np.ndarray]:
+        if not isinstance(drawn, Sequence | np.ndarray) or len(drawn) != 2:
+            raise validate.fail(
+                self.name, "drawn", "be two corners [length]", drawn, "give (lower, upper)"
+            )
+        lower, upper = (validate.vector(self.name, "drawn", each, unit="length") for each in drawn)
+        if not (lower < upper).all():
+            raise validate.fail(
+                self.name, "drawn", f"have its upper corner above {lower.tolist()} [length]", upper,
+                "swap the corners",
+            )  # fmt: skip
+        return lower, upper
+
+    def kind(self) -> tuple[Any, ...]:
+        given = (self.law.key, tuple(self.parameters)) if "law" in vars(self) else ()
+        return (type(self), *given)
+
+    def distance(self, points: Any) -> np.ndarray:
+        """The law at points (n, 3) [length] of the boundary as described, that is at time 0.
+
+        Returns:
+            (n,) [length], positive where particles may be.
+        """
+        x = validate.rows(f"{self.name}.distance", "points", points, None, 3)
+        values = self._geometry()
+        kinds = {
+            name: {wp.vec3: wp.vec3d, int: wp.int32}.get(self.law.parameters[name], wp.float64)
+            for name in values
+        }
+        Params = parameter_struct("DistanceParameters", tuple(kinds.items()))
+        given = Params()
+        for name, value in values.items():
+            setattr(given, name, kinds[name](value))
+        kernel = kernels.distance_kernel(self.law.function(FLOAT64), tuple(kinds), Params)
+        found = wp.empty(len(x), dtype=wp.float64, device="cpu")
+        places = wp.array(x, dtype=wp.vec3d, device="cpu")
+        wp.launch(kernel, len(x), [given, places], [found], device="cpu")
+        return found.numpy()
 
     @property
     def moves(self) -> bool:
@@ -82,116 +196,66 @@ class Boundary(EasedConstraint):
         pivot = self._pivot()
         return travel * time + pivot - rotation @ pivot, rotation
 
-    def _drawn(self, kind: str, **parameters: Any) -> dict[str, Any]:
-        """The shape for recordings, which ask a moving one for its pose."""
+    def shapes(self) -> list[dict[str, Any]]:
+        """Its surface in the box that is drawn, clear where it closes in the particles."""
+        from warp.geometry import IsoSurfaceMarchingCubes
+
+        if self._box is None:
+            return []
+        lower, upper = self._box
+        nodes = 1 + np.ceil(CELLS * (upper - lower) / (upper - lower).max()).astype(int)
+        axes = [np.linspace(*ends) for ends in zip(lower, upper, nodes, strict=True)]
+        d = self.distance(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3))
+        d = d.reshape(nodes)
+        field = wp.array(d, dtype=wp.float32, device="cpu")
+        points, corners = IsoSurfaceMarchingCubes.extract(field, lower=lower, upper=upper)
+        triangles = corners.numpy().reshape(-1, 3)
+        inside = bool(d[np.ix_([0, -1], [0, -1], [0, -1])].max() < 0)
+        mesh = {"points": points.numpy(), "triangles": triangles, "container": inside}
+        return [self._shape("mesh", **mesh)] if len(triangles) else []
+
+    def _shape(self, kind: str, **parameters: Any) -> dict[str, Any]:
+        """A shape for recordings, which ask a moving one for its pose."""
         moving = any(each.any() for each in self._carried())
         return {"kind": kind, "moving": moving, **parameters}
 
     def _pivot(self) -> np.ndarray:
         """What it turns about, as described."""
-        raise NotImplementedError
+        return self.pivot
 
     def _carried(self) -> tuple[np.ndarray, np.ndarray]:
         """Velocity and angular velocity, less what moves the shape in itself."""
         return self.velocity, self.angular_velocity
 
+    def _geometry(self) -> dict[str, Any]:
+        """What the surface takes, by name."""
+        return self.parameters
+
     def _check(self, model: Model, w: int) -> None:
-        """The shape is fit for world w."""
+        """The shape is fit for world w: along a periodic axis, one period on it is the same."""
+        axes = np.flatnonzero(model.periodic)
+        if not len(axes) or not model.scenes[w].particle_count:
+            return
+        if self.angular_velocity.any():
+            raise validate.fail(
+                self.name, "angular_velocity", "be 0 in a periodic scene", self.angular_velocity,
+                "leave it out",
+            )  # fmt: skip
+        x, length = model.scenes[w].position, model.box_length[w]
+        lower = np.where(model.periodic, model.box_lower[w], x.min(axis=0) - length.max())
+        upper = np.where(model.periodic, lower + length, x.max(axis=0) + length.max())
+        points = np.random.default_rng(0).uniform(lower, upper, (PLACES, 3))
+        d = self.distance(points)
+        for axis in axes:
+            gap = np.abs(self.distance(points + length * np.eye(3)[axis]) - d).max()
+            if not gap <= 1e-6 * length[axis]:
+                raise validate.fail(
+                    self.name, f"law {self.law.name}",
+                    f"be the same one period on, {length[axis]:g} along {'xyz'[axis]} [length]",
+                    f"a difference of {gap:g}", "give it that period, or leave the axis open",
+                )  # fmt: skip
 
     def surface(self, precision: Precision) -> wp.Function:
         """Where it is, as a Warp function (see kernels.constraints.boundary_shapes)."""
-        raise NotImplementedError
-
-    def prepare(self, model: Model, neighbors: Neighbors) -> None:
-        self.model = model
-        for w, peer in enumerate(self.peers):
-            peer._check(model, w)
-        members = model.members([peer.group for peer in self.peers], self.name)
-        self.count = len(members)
-        self.held = kernels.held_type(model.precision, self.sides)()
-        self.held.particle = model.array(members, wp.int32)
-        self.worlds_held = model.world_of[members]
-        self.held.world = model.array(self.worlds_held, wp.int32)
-        names = (*self.geometry, "friction", "restitution")
-        columns = {name: self._column(name) for name in names}
-        self.Params, self.params = model.parameters(f"{type(self).__name__}Parameters", columns)
-        self.rough, self.bouncing = (bool(columns[name].any()) for name in names[-2:])
-        self.moving = any(peer.moves for peer in self.peers)
-        if self.moving:
-            self.requires = self.requires | {"time"}
-
-    def _column(self, name: str) -> np.ndarray:
-        """An attribute of all worlds; what is true or false as whole numbers."""
-        values = np.array([getattr(peer, name) for peer in self.peers])
-        return values.astype(np.int32) if values.dtype == bool else values
-
-    def attach(self, model: Model, state: State) -> None:
-        if not self.count:
-            return
-        device, precision = model.device, model.precision
-        each = precision.vector(self.sides)
-        self.bodies = bodies(model, state)
-        self.easing = Easing(model, self.count, each, ends=1)
-        self.held.radius = state.radius
-        self.held.slack, self.held.marked = self.easing.slack, self.easing.marked
-        if self.rough:
-            self.held.grip = wp.zeros(self.count, dtype=each, device=device)
-        if self.moving:
-            self._attach_motion(state)
-        forces = "force" in state
-        self.force = state.force if forces else wp.empty(0, dtype=precision.vec3, device=device)
-        self.form = kernels.Form(
-            self.surface(precision), self.sides, precision, self.Params, "position_error" in state,
-            self.moving,
-        )  # fmt: skip
-        self.begin_kernel = kernels.begin_kernel(self.form)
-        self.project_kernel = kernels.project_kernel(self.form)
-        self.bounce_kernel = kernels.bounce_kernel(self.form, forces)
-
-    def _attach_motion(self, state: State) -> None:
-        """The motions of all worlds, and room for where they have led."""
-        model = self.model
-        carried = [peer._carried() for peer in self.peers]
-        columns = {
-            "velocity": [peer.velocity for peer in self.peers],
-            "spin": [peer.angular_velocity for peer in self.peers],
-            "travel": [travel for travel, _ in carried],
-            "turn": [turn for _, turn in carried],
-            "pivot": [peer._pivot() for peer in self.peers],
-        }
-        self.motion = model.structures(
-            motion_type(), {name: np.array(rows) for name, rows in columns.items()}
-        )
-        self.clock = state.time
-        self.held.pose = wp.zeros(
-            model.world_count, dtype=pose_type(model.precision), device=model.device
-        )
-
-    def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
-        return self.worlds_held if name == "slack" else super().worlds(name, array)
-
-    def _launch(self, kernel: wp.Kernel, *inputs: Any) -> None:
-        everything = [self.params, self.held, self.bodies, *inputs]
-        launch(kernel, self.count, everything, self.model.device)
-
-    def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        if not self.count or dt <= 0:
-            return
-        if self.moving:
-            # The clock goes with the positions: this is where the substep ends.
-            model = self.model
-            inputs = [self.motion, self.clock, self.held.pose]
-            launch(pose_kernel(model.precision), model.world_count, inputs, model.device)
-        # A static projection goes by the radii as they are, and leaves the marks to the first step.
-        if dt < math.inf:
-            self._launch(self.begin_kernel, self.easing.struct, dt)
-            call(self.easing.unmark)
-
-    def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        if self.count and dt > 0:
-            timed = dt < math.inf
-            self._launch(self.project_kernel, float(timed), dt if timed else 0.0)
-
-    def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        if self.count and self.bouncing and dt > 0:
-            self._launch(self.bounce_kernel, self.force, dt, 1.0 / dt)
+        law, names = self.law.function(precision), tuple(self.parameters)
+        return kernels.distance_function(law, names, precision, self.Params)

@@ -14,8 +14,14 @@ from ..engine.probing.limit import Limit
 from ..engine.probing.probe import Probe
 from ..kernels.constraints import boundary_shapes as kernels
 from ..kernels.precision import Precision
+from ..scene.law import law
 from .boundary import STILL, Boundary
-from .limits import box_limits, sphere_limits
+from .limits import crossing_limits
+
+
+@law
+def _half_space(x: wp.vec3, point: wp.vec3, normal: wp.vec3):
+    return wp.dot(x - point, normal)
 
 
 class PlaneBoundary(Boundary):
@@ -43,7 +49,7 @@ class PlaneBoundary(Boundary):
         [0.0, 1.0, 0.0]
     """
 
-    geometry = ("point", "normal")
+    law = _half_space
 
     def __init__(
         self,
@@ -56,7 +62,7 @@ class PlaneBoundary(Boundary):
         velocity: Sequence[float] = STILL,
         angular_velocity: Sequence[float] = STILL,
     ):
-        super().__init__(friction, restitution, group, velocity, angular_velocity)
+        self._holds(friction, restitution, group, velocity, angular_velocity)
         self.point = validate.vector(self.name, "point", point, unit="length")
         given = validate.vector(self.name, "normal", normal)
         longest = np.abs(given).max()
@@ -70,8 +76,11 @@ class PlaneBoundary(Boundary):
     def surface(self, precision: Precision) -> wp.Function:
         return kernels.plane_function(precision, self.Params)
 
+    def _geometry(self) -> dict[str, Any]:
+        return {"point": self.point, "normal": self.normal}
+
     def shapes(self) -> list[dict[str, Any]]:
-        return [self._drawn("plane", point=self.point, normal=self.normal)]
+        return [self._shape("plane", point=self.point, normal=self.normal)]
 
     def _pivot(self) -> np.ndarray:
         return self.point
@@ -91,6 +100,12 @@ class PlaneBoundary(Boundary):
                 self.name, "normal", "be along the open axes of a periodic scene", self.normal,
                 "leave that axis open",
             )  # fmt: skip
+
+
+@law
+def _room(x: wp.vec3, lower: wp.vec3, upper: wp.vec3):
+    a, b = x - lower, upper - x
+    return wp.min(wp.min(wp.min(a[0], b[0]), wp.min(a[1], b[1])), wp.min(a[2], b[2]))
 
 
 class BoxBoundary(Boundary):
@@ -117,8 +132,8 @@ class BoxBoundary(Boundary):
         [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     """
 
+    law = _room
     sides = 3
-    geometry = ("lower", "upper")
 
     def __init__(
         self,
@@ -131,7 +146,7 @@ class BoxBoundary(Boundary):
         velocity: Sequence[float] = STILL,
         angular_velocity: Sequence[float] = STILL,
     ):
-        super().__init__(friction, restitution, group, velocity, angular_velocity)
+        self._holds(friction, restitution, group, velocity, angular_velocity)
         self.lower = self._corner("lower", lower, -np.inf)
         self.upper = self._corner("upper", upper, np.inf)
         if not (self.lower < self.upper).all():
@@ -157,12 +172,16 @@ class BoxBoundary(Boundary):
     def surface(self, precision: Precision) -> wp.Function:
         return kernels.box_function(precision, self.Params)
 
+    def _geometry(self) -> dict[str, Any]:
+        return {"lower": self.lower, "upper": self.upper}
+
     def shapes(self) -> list[dict[str, Any]]:
-        return [self._drawn("box", lower=self.lower, upper=self.upper)]
+        return [self._shape("box", lower=self.lower, upper=self.upper)]
 
     def limits(self, probe: Probe) -> list[Limit]:
-        """By the speed of the particles against the width; half spaces are never passed through."""
-        return box_limits(self, probe)
+        """|v| dt <= upper - lower along each axis; half spaces are never passed through."""
+        names = [f"width / v along {axis}" for axis in "xyz"]
+        return crossing_limits(self, probe, names, lambda box, v: (box.upper - box.lower) / abs(v))
 
     def _pivot(self) -> np.ndarray:
         middle = 0.5 * self.lower + 0.5 * self.upper
@@ -180,6 +199,12 @@ class BoxBoundary(Boundary):
                     self.name, f"sides along {'xyz'[axis]}", "be open where the scene is periodic",
                     [float(self.lower[axis]), float(self.upper[axis])], "use -inf and inf",
                 )  # fmt: skip
+
+
+@law
+def _ball(x: wp.vec3, center: wp.vec3, radius: float, inside: int):
+    d = wp.length(x - center) - radius
+    return wp.where(inside != 0, -d, d)
 
 
 class SphereBoundary(Boundary):
@@ -207,7 +232,7 @@ class SphereBoundary(Boundary):
         [3.0, 0.0, 0.0]
     """
 
-    geometry = ("center", "radius", "inside")
+    law = _ball
 
     def __init__(
         self,
@@ -221,7 +246,7 @@ class SphereBoundary(Boundary):
         velocity: Sequence[float] = STILL,
         angular_velocity: Sequence[float] = STILL,
     ):
-        super().__init__(friction, restitution, group, velocity, angular_velocity)
+        self._holds(friction, restitution, group, velocity, angular_velocity)
         self.center = validate.vector(self.name, "center", center, unit="length")
         self.radius = validate.number(self.name, "radius", radius, above=0.0, unit="length")
         self.inside = bool(inside)
@@ -229,13 +254,19 @@ class SphereBoundary(Boundary):
     def surface(self, precision: Precision) -> wp.Function:
         return kernels.sphere_function(precision, self.Params)
 
+    def _geometry(self) -> dict[str, Any]:
+        return {"center": self.center, "radius": self.radius, "inside": int(self.inside)}
+
     def shapes(self) -> list[dict[str, Any]]:
         ball = {"center": self.center, "radius": self.radius, "container": self.inside}
-        return [self._drawn("sphere", **ball)]
+        return [self._shape("sphere", **ball)]
 
     def limits(self, probe: Probe) -> list[Limit]:
-        """By the speed of the particles against the radius."""
-        return sphere_limits(self, probe)
+        """|v| dt <= radius: to cross a container, or to pass the middle of an obstacle."""
+        return crossing_limits(
+            self, probe, ["radius / v"],
+            lambda ball, v: ball.radius / np.linalg.norm(v, axis=1, keepdims=True),
+        )  # fmt: skip
 
     def _pivot(self) -> np.ndarray:
         return self.center
