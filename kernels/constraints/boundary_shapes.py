@@ -17,6 +17,7 @@ from ..precision import FLOAT64, Precision, function, function_from_source, regi
 
 UNIT = 1.0e-3  # a gradient whose length is farther from 1 is not that of a distance
 ASIDE = 32.0  # roundings of a place, from which a gradient is taken once more
+ROUNDS = 64  # of Newton's steps; from a vanishing gradient the first goes far, and each halves it
 
 
 def normals_type(precision: Precision, sides: int) -> Any:
@@ -44,26 +45,41 @@ def measure_function(
 def distance_function(
     law: wp.Function, names: tuple[str, ...], precision: Precision, params: Any
 ) -> wp.Function:
-    """A signed distance d(x), positive where particles may be: d / |grad d| >= R.
+    """A law d(x), positive where particles may be: the distance from where it is 0 is R or more.
 
-    That is the distance itself where the gradient has unit length, and its first order elsewhere.
-    A gradient of another length may also be none, as that of the distance from a line on the line:
-    it is taken once more next to x, and the larger one holds. Where there is none at all, the
-    direction is fixed. What is no number makes none of the particle, for the watchdog to find.
+    Where the gradient has unit length that distance is d itself. A gradient of another length may
+    be none, as that of the distance from a line on the line: it is taken once more next to x, and
+    the longer one holds. If that is no unit vector either, the distance is the way along it to
+    where d is 0, d / |grad d| to first order. Where there is no gradient at all, the direction is
+    fixed. What is no number makes none of the particle, for the watchdog to find.
     """
     vec3, real = precision.vec3, precision.scalar
     each, normals = precision.vector(1), normals_type(precision, 1)
     measure = measure_function(law, names, precision, params)
     rounding = ASIDE * float(np.finfo(precision.numpy).eps)
 
+    def way_out(y: vec3, n: vec3, d: real, p: params):
+        """The way back along n to where the law is 0, by Newton's steps from d."""
+        for _k in range(ROUNDS):
+            value, g = measure(y - n * d, p)
+            slope = wp.dot(g, n)
+            if not slope > real(0.0):
+                break
+            step = value / slope
+            d = d + step
+            if not wp.abs(step) > real(rounding) * (wp.abs(d) + wp.max(wp.abs(y))):
+                break
+        return d
+
+    way = function(way_out, after_gradients=True)
+
     def distance_sides(x: vec3, e: vec3, R: real, slack: each, p: params):
         y = x + e
         d, g = measure(y, p)
         steep = wp.length(g)
         if not wp.abs(steep - real(1.0)) < real(UNIT):
-            away = vec3(real(0.48), real(0.6), real(0.64))
             near = real(rounding) * (wp.max(wp.abs(y)) + wp.abs(d) + R)
-            _d, other = measure(y + away * near, p)
+            _d, other = measure(y + vec3(real(0.48), real(0.6), real(0.64)) * near, p)
             if not wp.length(other) < (real(1.0) + real(UNIT)) * steep:
                 g = other
                 steep = wp.length(g)
@@ -71,6 +87,8 @@ def distance_function(
         if steep > real(0.0):
             n = g / steep
             d = d / steep
+        if d < R and not wp.abs(steep - real(1.0)) < real(UNIT):
+            d = way(y, n, d, p)
         back = wp.max(R - slack[0] - (d + wp.dot(n, e - (y - x))), real(0.0))
         if wp.isnan(d):
             back = real(1.0)
