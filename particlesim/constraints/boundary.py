@@ -35,9 +35,10 @@ class Boundary(Holding):
     restitution sets the normal velocity against the surface's after the solve (Mueller et al. 2020,
     eq. 34). What starts outside is brought in at no more than ``Settings.depenetration_speed``.
 
-    The normal is the law's gradient, derived. A law whose gradient has another length than 1 is
-    taken as d / |grad d|: near the surface that is a distance as well, to first order. On a place
-    without a gradient, as the axis of a cylinder, the way out is that of a place next to it.
+    The normal is the law's gradient, derived. Where that has another length than 1, the law is no
+    distance, and the way along its gradient to where it is 0 counts: d / |grad d| to first order.
+    On a place without a gradient, as the axis of a cylinder, that of a place next to it does. What
+    goes through in one substep is not seen.
 
     A boundary moves as a rigid body from where it is described, by its world's clock: place and
     turn at time t are exact, however many substeps led there.
