@@ -23,7 +23,7 @@ CELLS = 64  # along the longest side of what is drawn
 PLACES = 4096  # at which a law is asked for its period
 # Arguments of every boundary.
 OWN = frozenset(
-    {"friction", "restitution", "group", "velocity", "angular_velocity", "pivot", "drawn"}
+    {"law", "friction", "restitution", "group", "velocity", "angular_velocity", "pivot", "drawn"}
 )
 
 

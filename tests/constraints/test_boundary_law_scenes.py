@@ -146,6 +146,23 @@ def floor_of_all(**options):
     return ps.Boundary(waves, **{"height": 0.1, "number": 2 * np.pi, **options})
 
 
+class Ring(ps.Boundary):
+    """A boundary of one's own: its law, under a name."""
+
+    def __init__(self, radius, **options):
+        super().__init__(torus, ring=radius, tube=0.1 * radius, **options)
+
+
+def test_a_class_of_ones_own(device, simulate, scene_of, refused):
+    """Is called by its name."""
+    sim = simulate(scene_of([(1, 0.2, 0)], Ring(1.0), radius=0.1, gravity=True), device)
+    sim.run(10)
+    assert sim.position[0] == pytest.approx([1, 0.2, 0], abs=1e-12)
+    assert {who for who, _, _ in sim.explain().launches} >= {"Ring"}
+    with refused("Ring: ring must be finite"):
+        Ring(np.inf)
+
+
 # Reading and drawing ------------------------------------------------------------------------------
 
 
