@@ -1,4 +1,4 @@
-"""A team of threads that share chains of recorded launches (see :mod:`particlesim.kernels.engine.team`).
+"""A team of threads that share chains of launches (see :mod:`particlesim.kernels.engine.team`).
 
 Between two shared launches lie tens of microseconds, and waking a thread that sleeps takes
 hundreds. So a worker looks for the next launch in native code for some milliseconds before it goes
@@ -7,7 +7,6 @@ to sleep.
 
 from __future__ import annotations
 
-import ctypes
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -17,6 +16,7 @@ import numpy as np
 import warp as wp
 
 from ...kernels.engine.team import LEAVE, LEFT, POSTS, RING, STAGE, serve_kernel, share_kernel
+from ...kernels.warp_internals import Packed
 
 # A worker looks for work for about five milliseconds. The caller, who waits for the workers, looks
 # for a shorter while and then lets others run: one of them may be the worker that it waits for.
@@ -34,8 +34,8 @@ class Chain:
         self._kept = []  # what the tables point to
         table = []
         for commands in stages:
-            packed = [_packed(command) for command in commands]
-            chunks = np.array([addresses for addresses, _ in packed], dtype=np.uint64)
+            packed = [Packed(command) for command in commands]
+            chunks = np.array([each.addresses for each in packed], dtype=np.uint64)
             self._kept.append((packed, chunks))
             table.append((chunks.ctypes.data, len(chunks)))
         self.table = np.array(table, dtype=np.uint64)
@@ -102,13 +102,7 @@ class _Board:
         """One of the team's kernels as a function; chunks are taken from front or back."""
         inputs = [0, self.memory, looks, int(back)]
         command = wp.launch(kernel, 1, inputs, device="cpu", record_cmd=True)
-        (entry, bounds, arguments), kept = _packed(command)
-        call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(entry)
-
-        def act(_kept: Any = kept) -> None:
-            call(bounds, arguments)
-
-        return act
+        return Packed(command).function()
 
     def offer(self, chain: Chain) -> None:
         """Lay out the stages; nothing of an earlier chain is still under way."""
@@ -135,17 +129,3 @@ def _work(board: _Board, serve: Callable[[], None]) -> None:
             if board.posts == seen and not board.words[LEAVE]:
                 board.awake.wait()
             board.asleep -= 1
-
-
-def _packed(command: Any) -> tuple[tuple[int, int, int], Any]:
-    """Addresses of a command's entry point, bounds and arguments, and what must live as long.
-
-    A compiled CPU kernel is a function of two pointers: the bounds, and a struct of its arguments.
-    """
-    bounds, *values = command.params
-    names = [argument.label for argument in command.kernel.adj.args]
-    kinds = list(zip(names, map(type, values), strict=True))
-    arguments = type("Arguments", (ctypes.Structure,), {"_fields_": kinds})(*values)
-    entry = ctypes.cast(command.hooks.forward, ctypes.c_void_p).value or 0
-    addresses = (entry, ctypes.addressof(bounds), ctypes.addressof(arguments))
-    return addresses, (command, bounds, arguments)
