@@ -11,6 +11,7 @@ import warp as wp
 from .. import validate
 from ..kernels.engine.loops import Periodicity, box_type
 from ..kernels.precision import PRECISIONS
+from ..kernels.self_check import fast_ways
 from ..scene.group import select
 from ..scene.scene import Scene
 from ..scene.settings import Settings
@@ -62,7 +63,7 @@ class Model:
     @property
     def vectorised(self) -> bool:
         """Loops over pairs are C++ for the CPU's vector units, rather than Warp's own."""
-        return bool(self.device.is_cpu)
+        return self.device.is_cpu and fast_ways()
 
     def _attributes(self) -> dict[str, int | None]:
         result: dict[str, int | None] = {}
