@@ -33,6 +33,10 @@ _DOUBLE["float32"] = wp.float64
 _EXTREMES = {"max": larger, "min": smaller, "clamp": within}
 
 
+# Coincident particles part along this direction, or with its components' signs turned.
+APART = (0.48, 0.6, 0.64)
+
+
 @dataclass(frozen=True)
 class Precision:
     """Scalar and vector types of one floating point precision."""

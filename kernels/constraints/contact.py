@@ -11,7 +11,6 @@ from .constraints import bodies_type
 from .easing import ease_function, easing_type
 
 
-@functools.cache
 def contact_types(precision: Precision) -> tuple[Any, Any]:
     """Slot-ordered copies, and what the count of contacts writes."""
     vec3, real = precision.vec3, precision.scalar

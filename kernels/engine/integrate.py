@@ -10,7 +10,6 @@ from ..precision import Precision, function, register, structure
 from .loops import Periodicity, box_type
 
 
-@functools.cache
 def motion_type(precision: Precision) -> Any:
     """The arrays that integration touches; those that a scene does not require stay empty."""
     vec3, real = precision.vec3, precision.scalar
@@ -30,45 +29,66 @@ def motion_type(precision: Precision) -> Any:
     return structure(f"Motion_{precision.name}", fields)
 
 
-@functools.cache
-def integration_kernels(
-    precision: Precision, periodic: Periodicity, forces: bool, compensated: bool,
-    constrained: bool, remember: bool,
-) -> SimpleNamespace:  # fmt: skip
-    """The kernels for what a scene has.
+def compensated_sum(precision: Precision) -> wp.Function:
+    """``add(x, dx, e) -> (sum, error)``: what the sum rounds away goes with the next one's dx.
 
-    forces: there are forces. compensated: Kahan sums. constrained: corrections follow.
-    remember: keep the positions at the start of the substep.
+    Kahan (1965).
     """
-    vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
-    wraps = bool(periodic)
+    vec3 = precision.vec3
+
+    def kahan(x: vec3, dx: vec3, e: vec3):
+        step = dx + e
+        total = x + step
+        return total, step - (total - x)
+
+    return function(kahan)
+
+
+def kick_function(precision: Precision, forces: bool, compensated: bool) -> wp.Function:
+    """``kick(i, dt, m) -> v``: v += w f dt."""
+    real, Motion, add = precision.scalar, motion_type(precision), compensated_sum(precision)
+
+    def coast(i: int, dt: real, m: Motion):
+        return m.v[i]
 
     def kick(i: int, dt: real, m: Motion):
-        v = m.v[i]
-        if wp.static(forces):
-            dv = m.f[i] * (m.w[i] * dt)
-            if wp.static(compensated):
-                # Kahan (1965): what the sum rounds away is carried to the next one.
-                dv = dv + m.v_error[i]
-                total = v + dv
-                m.v_error[i] = dv - (total - v)
-                v = total
-            else:
-                v = v + dv
-            m.v[i] = v
+        v = m.v[i] + m.f[i] * (m.w[i] * dt)
+        m.v[i] = v
         return v
 
-    def move(i: int, dx: vec3, m: Motion):
-        x = m.x[i]
-        if wp.static(compensated):
-            step = dx + m.x_error[i]
-            total = x + step
-            m.x_error[i] = step - (total - x)
-            m.x[i] = total
-        else:
-            m.x[i] = x + dx
+    def kick_exactly(i: int, dt: real, m: Motion):
+        v, error = add(m.v[i], m.f[i] * (m.w[i] * dt), m.v_error[i])
+        m.v_error[i] = error
+        m.v[i] = v
+        return v
 
-    add_position = function(move)
+    return function(coast if not forces else kick_exactly if compensated else kick)
+
+
+def move_function(precision: Precision, compensated: bool) -> wp.Function:
+    """``move(i, dx, m)``: x += dx."""
+    vec3, Motion, add = precision.vec3, motion_type(precision), compensated_sum(precision)
+
+    def move(i: int, dx: vec3, m: Motion):
+        m.x[i] = m.x[i] + dx
+
+    def move_exactly(i: int, dx: vec3, m: Motion):
+        x, error = add(m.x[i], dx, m.x_error[i])
+        m.x_error[i] = error
+        m.x[i] = x
+
+    return function(move_exactly if compensated else move)
+
+
+def wrap_function(
+    precision: Precision, periodic: Periodicity, compensated: bool, remember: bool
+) -> wp.Function:
+    """``wrap(i, m)``: a particle that has left the periodic box comes back in on the other side."""
+    vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
+    move = move_function(precision, compensated)
+
+    def stay(i: int, m: Motion):
+        pass
 
     def wrap(i: int, m: Motion):
         # One box length at most: a substep that crosses a whole box is past any stability limit.
@@ -82,12 +102,30 @@ def integration_kernels(
                 crossed[a] = n
                 shift[a] = -real(n) * b.length[a]
         if wp.length_sq(shift) > real(0.0):
-            add_position(i, shift, m)
+            move(i, shift, m)
             m.image[i] = m.image[i] + crossed
             if wp.static(remember):
                 m.x_previous[i] = m.x_previous[i] + shift
 
-    add_force, into_box = function(kick), function(wrap)
+    return function(wrap if periodic else stay)
+
+
+@functools.cache
+def integration_kernels(
+    precision: Precision, periodic: Periodicity, forces: bool, compensated: bool,
+    constrained: bool, remember: bool,
+) -> SimpleNamespace:  # fmt: skip
+    """The kernels for what a scene has.
+
+    forces: there are forces. compensated: Kahan sums. constrained: corrections follow.
+    remember: keep the positions at the start of the substep.
+    """
+    vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
+    kick, move = (
+        kick_function(precision, forces, compensated),
+        move_function(precision, compensated),
+    )
+    wrap = wrap_function(precision, periodic, compensated, remember)
 
     @register
     def advance(first: int, dt_kick: real, dt_drift: real, m: Motion):
@@ -95,25 +133,23 @@ def integration_kernels(
         i = first + wp.tid()
         if wp.static(remember):
             m.x_previous[i] = m.x[i]
-        v = add_force(i, dt_kick, m)
-        add_position(i, v * dt_drift, m)
+        v = kick(i, dt_kick, m)
+        move(i, v * dt_drift, m)
         if wp.static(constrained):
             m.correction[i] = vec3()
-        if wp.static(wraps):
-            into_box(i, m)
+        wrap(i, m)
 
     @register
     def kick_only(first: int, dt: real, m: Motion):
         """v += w f dt."""
-        add_force(first + wp.tid(), dt, m)
+        kick(first + wp.tid(), dt, m)
 
     @register
     def follow_corrections(first: int, inverse_dt: real, m: Motion):
         """v += correction / dt: the velocity follows the projection."""
         i = first + wp.tid()
         m.v[i] = m.v[i] + m.correction[i] * inverse_dt
-        if wp.static(wraps):
-            into_box(i, m)
+        wrap(i, m)
 
     return SimpleNamespace(
         advance=advance, kick_only=kick_only, follow_corrections=follow_corrections

@@ -10,12 +10,11 @@ import warp as wp
 
 from .. import validate
 from ..kernels.engine.loops import Periodicity, box_type
-from ..kernels.precision import PRECISIONS
+from ..kernels.precision import PRECISIONS, structure
 from ..kernels.self_check import fast_ways
 from ..scene.group import select
 from ..scene.scene import Scene
 from ..scene.settings import Settings
-from .structs import parameter_struct
 
 
 def choose_device(device: Any) -> Any:
@@ -119,7 +118,7 @@ class Model:
             else precision.vec3 if np.ndim(column) == 2 else precision.scalar
             for key, column in columns.items()
         }  # fmt: skip
-        kind = parameter_struct(name, tuple(kinds.items()))
+        kind = structure(name, kinds)
         return kind, self.structures(kind, columns)
 
     def array(self, values: Any, dtype: Any) -> wp.array:
