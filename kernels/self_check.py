@@ -39,6 +39,7 @@ def fast_ways() -> bool:
         warnings.warn(
             f"Simulation: native loops and packed launches fail on Warp {wp.__version__} ({reason})"
             "; running Warp's own, which are slower: install the version in pyproject.toml.",
+            RuntimeWarning,
             stacklevel=2,
         )
     return not wrong
