@@ -21,7 +21,7 @@ import numpy as np
 import warp as wp
 
 from .extremes import larger, smaller, within
-from .warp_internals import compiled, digest, named_function
+from .warp_internals import compiled, digest, is_after_gradients, named_function
 
 # Generic names that a law may use, and what they become in float64.
 _DOUBLE = {
@@ -164,7 +164,9 @@ def translate(
         for name, parameter in inspect.signature(func, eval_str=True).parameters.items()
     }
     name = f"law_{func.__name__}_{digest(source, precision.name, *hints.values(), *used.values())}"
-    return named_function(copy, name, annotations=hints, source=source)
+    # A law that calls what is derived inside comes behind the adjoints too.
+    derives = "grad" in func.__code__.co_names or any(map(is_after_gradients, used.values()))
+    return named_function(copy, name, annotations=hints, source=source, after_gradients=derives)
 
 
 def _rewritten(func: Callable[..., Any], precision: Precision, scope: dict[str, Any]) -> str:

@@ -1,7 +1,7 @@
 """What rests on Warp's insides, all of it: elsewhere only Warp's public interface is used.
 
 Written against warp-lang 1.19. Every function says which private facts it rests on; each fact has a
-test that fails first on a Warp that has changed it (tests/kernels/test_warp_internals.py), and
+test that fails first on a Warp that has changed it (tests/kernels/test_warp_*.py), and
 :mod:`particlesim.kernels.self_check` tries the fast ways that are built on them once a process.
 """
 
@@ -67,6 +67,11 @@ def named_function(
         made.adj.uses_grad_call = after_gradients
         _FUNCTIONS[key] = made
     return _FUNCTIONS[key]
+
+
+def is_after_gradients(value: Any) -> bool:
+    """Whether it is a function emitted behind the adjoints. Rests on: ``adj.uses_grad_call``."""
+    return getattr(getattr(value, "adj", None), "uses_grad_call", False)
 
 
 def native_name(function: wp.Function) -> str:

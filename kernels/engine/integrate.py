@@ -44,51 +44,37 @@ def compensated_sum(precision: Precision) -> wp.Function:
     return function(kahan)
 
 
-def kick_function(precision: Precision, forces: bool, compensated: bool) -> wp.Function:
-    """``kick(i, dt, m) -> v``: v += w f dt."""
-    real, Motion, add = precision.scalar, motion_type(precision), compensated_sum(precision)
-
-    def coast(i: int, dt: real, m: Motion):
-        return m.v[i]
+def motion_functions(
+    precision: Precision, forces: bool, compensated: bool, remember: bool
+) -> tuple[wp.Function, wp.Function, wp.Function]:
+    """``kick(i, dt, m) -> v``: v += w f dt; ``move(i, dx, m)``: x += dx; and ``wrap(i, m)``: a
+    particle that has left the periodic box comes back in on the other side.
+    """
+    vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
+    add = compensated_sum(precision)
 
     def kick(i: int, dt: real, m: Motion):
-        v = m.v[i] + m.f[i] * (m.w[i] * dt)
-        m.v[i] = v
+        v = m.v[i]
+        if wp.static(forces):
+            dv = m.f[i] * (m.w[i] * dt)
+            if wp.static(compensated):
+                v, error = add(v, dv, m.v_error[i])
+                m.v_error[i] = error
+            else:
+                v = v + dv
+            m.v[i] = v
         return v
 
-    def kick_exactly(i: int, dt: real, m: Motion):
-        v, error = add(m.v[i], m.f[i] * (m.w[i] * dt), m.v_error[i])
-        m.v_error[i] = error
-        m.v[i] = v
-        return v
-
-    return function(coast if not forces else kick_exactly if compensated else kick)
-
-
-def move_function(precision: Precision, compensated: bool) -> wp.Function:
-    """``move(i, dx, m)``: x += dx."""
-    vec3, Motion, add = precision.vec3, motion_type(precision), compensated_sum(precision)
-
-    def move(i: int, dx: vec3, m: Motion):
-        m.x[i] = m.x[i] + dx
-
-    def move_exactly(i: int, dx: vec3, m: Motion):
-        x, error = add(m.x[i], dx, m.x_error[i])
-        m.x_error[i] = error
+    def move_by(i: int, dx: vec3, m: Motion):
+        x = m.x[i]
+        if wp.static(compensated):
+            x, error = add(x, dx, m.x_error[i])
+            m.x_error[i] = error
+        else:
+            x = x + dx
         m.x[i] = x
 
-    return function(move_exactly if compensated else move)
-
-
-def wrap_function(
-    precision: Precision, periodic: Periodicity, compensated: bool, remember: bool
-) -> wp.Function:
-    """``wrap(i, m)``: a particle that has left the periodic box comes back in on the other side."""
-    vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
-    move = move_function(precision, compensated)
-
-    def stay(i: int, m: Motion):
-        pass
+    move = function(move_by)
 
     def wrap(i: int, m: Motion):
         # One box length at most: a substep that crosses a whole box is past any stability limit.
@@ -107,7 +93,7 @@ def wrap_function(
             if wp.static(remember):
                 m.x_previous[i] = m.x_previous[i] + shift
 
-    return function(wrap if periodic else stay)
+    return function(kick), move, function(wrap)
 
 
 @functools.cache
@@ -121,11 +107,8 @@ def integration_kernels(
     remember: keep the positions at the start of the substep.
     """
     vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
-    kick, move = (
-        kick_function(precision, forces, compensated),
-        move_function(precision, compensated),
-    )
-    wrap = wrap_function(precision, periodic, compensated, remember)
+    kick, move, wrap = motion_functions(precision, forces, compensated, remember)
+    wraps = bool(periodic)
 
     @register
     def advance(first: int, dt_kick: real, dt_drift: real, m: Motion):
@@ -137,7 +120,8 @@ def integration_kernels(
         move(i, v * dt_drift, m)
         if wp.static(constrained):
             m.correction[i] = vec3()
-        wrap(i, m)
+        if wp.static(wraps):
+            wrap(i, m)
 
     @register
     def kick_only(first: int, dt: real, m: Motion):
@@ -149,7 +133,8 @@ def integration_kernels(
         """v += correction / dt: the velocity follows the projection."""
         i = first + wp.tid()
         m.v[i] = m.v[i] + m.correction[i] * inverse_dt
-        wrap(i, m)
+        if wp.static(wraps):
+            wrap(i, m)
 
     return SimpleNamespace(
         advance=advance, kick_only=kick_only, follow_corrections=follow_corrections

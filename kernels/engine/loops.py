@@ -121,30 +121,29 @@ def plain_loop(
     Box, total = box_type(precision), precision.vector(width)
     image = minimum_image(precision, periodic)
 
-    def plain_rows(i: int, pairs: Pairs, box: Box, d: data, p: params):
+    rows = partners == ROWS
+
+    def plain_sum(i: int, pairs: Pairs, box: Box, d: data, p: params):
         x_i = d.x[i]
         result = total()
         row = wp.int64(i) * pairs.row_stride
-        for k in range(wp.min(pairs.count[i], pairs.capacity)):
-            j = pairs.index[row + wp.int64(k) * pairs.entry_stride]
-            x_ij = image(x_i - d.x[j], box)
-            r2 = wp.dot(x_ij, x_ij)
-            if r2 < p.cutoff_squared:
-                result += term(i, j, x_ij, r2, d, p)
-        return result
-
-    def plain_all(i: int, pairs: Pairs, box: Box, d: data, p: params):
-        x_i = d.x[i]
-        result = total()
-        w = pairs.world[i]
-        for j in range(pairs.begin[w], pairs.end[w]):
+        if wp.static(rows):
+            first = 0
+            last = wp.min(pairs.count[i], pairs.capacity)
+        else:
+            first = pairs.begin[pairs.world[i]]
+            last = pairs.end[pairs.world[i]]
+        for k in range(first, last):
+            j = k
+            if wp.static(rows):
+                j = pairs.index[row + wp.int64(k) * pairs.entry_stride]
             x_ij = image(x_i - d.x[j], box)
             r2 = wp.dot(x_ij, x_ij)
             if j != i and r2 < p.cutoff_squared:
                 result += term(i, j, x_ij, r2, d, p)
         return result
 
-    return function(plain_rows if partners == ROWS else plain_all, after_gradients=True)
+    return function(plain_sum, after_gradients=True)
 
 
 _HEAD = {

@@ -57,6 +57,21 @@ def moved_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
 
 
 @functools.cache
+def cell_coordinates_kernel(precision: Precision) -> wp.Kernel:
+    """Cell coordinates of points from a world's first slot on: a grid is built from, asked with."""
+    vec3, Cells = precision.vec3, cells_type(precision)
+
+    @register
+    def cell_coordinates(
+        first: int, cells: Cells, x: wp.array(dtype=vec3), u_out: wp.array(dtype=vec3)
+    ):
+        k = cells.first + first + wp.tid()
+        u_out[k] = cells.turn * (x[k] - cells.origin)
+
+    return cell_coordinates
+
+
+@functools.cache
 def build_kernels(precision: Precision) -> SimpleNamespace:
     """Kernels around a build that do not look at pairs."""
     vec3, Cells = precision.vec3, cells_type(precision)
@@ -84,13 +99,6 @@ def build_kernels(precision: Precision) -> SimpleNamespace:
             planes_out[a, k] = x_listed[k][a]
 
     @register
-    def cell_coordinates(
-        first: int, cells: Cells, x_listed: wp.array(dtype=vec3), u_out: wp.array(dtype=vec3)
-    ):
-        k = cells.first + first + wp.tid()
-        u_out[k] = cells.turn * (x_listed[k] - cells.origin)
-
-    @register
     def sort_slots(
         first: int,
         grid: wp.uint64,
@@ -109,8 +117,7 @@ def build_kernels(precision: Precision) -> SimpleNamespace:
             planes_out[a, cells.first + k] = x_listed[member][a]
 
     return SimpleNamespace(
-        take_positions=take_positions, spread=spread, cell_coordinates=cell_coordinates,
-        sort_slots=sort_slots,
+        take_positions=take_positions, spread=spread, sort_slots=sort_slots
     )  # fmt: skip
 
 

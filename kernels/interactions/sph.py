@@ -17,7 +17,6 @@ from typing import Any
 import warp as wp
 
 from ..engine.loops import Periodicity, box_type, minimum_image, reader
-from ..engine.neighbors import cells_type
 from ..precision import Precision, function, function_from_source, register
 from ..warp_internals import argument_names
 
@@ -137,19 +136,6 @@ def keep_measure(
         o.virial[particle] = o.virial[particle] + wp.float64(total[0])
 
     return function(keep)
-
-
-@functools.cache
-def cell_coordinates_kernel(precision: Precision) -> wp.Kernel:
-    """Cell coordinates of points, which a grid is built from and asked with."""
-    vec3, Cells = precision.vec3, cells_type(precision)
-
-    @register
-    def point_cells(first: int, cells: Cells, x: wp.array(dtype=vec3), u_out: wp.array(dtype=vec3)):
-        k = first + wp.tid()
-        u_out[k] = cells.turn * (x[k] - cells.origin)
-
-    return point_cells
 
 
 @functools.cache

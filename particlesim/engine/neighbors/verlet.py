@@ -200,12 +200,12 @@ class VerletList(AllPairs):
         model, device = self.model, self.model.device
         grid, place = self.grids[w]
         begin, count = int(self.begin_host[w]), int(self.end_host[w] - self.begin_host[w])
-        steps = kernels.build_kernels(model.precision)
         u = self.cell_coordinate[begin : begin + count]
-        launch(steps.cell_coordinates, count, [place, self.x_listed, self.cell_coordinate], device)
+        to_cells = kernels.cell_coordinates_kernel(model.precision)
+        launch(to_cells, count, [place, self.x_listed, self.cell_coordinate], device)
         call(lambda: grid.build(u, 1.0))
         launch(
-            steps.sort_slots,
+            kernels.build_kernels(model.precision).sort_slots,
             count,
             [grid.id, place, self.members, self.x_listed, self.order, self.slot,
              self.planes],
