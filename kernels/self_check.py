@@ -17,7 +17,7 @@ from .engine.loops import ROWS, Pairs, Periodicity, box_type, native_loop, plain
 from .engine.neighbors import cells_type
 from .engine.rows import BLOCK, SPARE, row_functions
 from .precision import FLOAT64, function, register, structure, translate
-from .warp_internals import Packed
+from .warp_internals import WRITTEN_FOR, Packed
 
 OPEN = Periodicity()
 VEC3, PAIR = FLOAT64.vec3, FLOAT64.vector(2)
@@ -38,7 +38,7 @@ def fast_ways() -> bool:
     for reason in wrong:
         warnings.warn(
             f"Simulation: native loops and packed launches fail on Warp {wp.__version__} ({reason})"
-            "; running Warp's own, which are slower: install the version in pyproject.toml.",
+            f"; running Warp's own, which are slower: install warp-lang {WRITTEN_FOR}.",
             RuntimeWarning,
             stacklevel=2,
         )

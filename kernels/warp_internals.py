@@ -1,7 +1,7 @@
 """What rests on Warp's insides, all of it: elsewhere only Warp's public interface is used.
 
-Written against warp-lang 1.19. Every function says which private facts it rests on; each fact has a
-test that fails first on a Warp that has changed it (tests/kernels/test_warp_*.py), and
+Every function says which private facts of ``WRITTEN_FOR`` it rests on. Each fact has a test, which
+fails first on a Warp that has changed it (tests/kernels/test_warp_*.py), and
 :mod:`particlesim.kernels.self_check` tries the fast ways that are built on them once a process.
 """
 
@@ -16,7 +16,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import warp as wp
-from warp._src.codegen import Struct
+
+WRITTEN_FOR = "1.19"  # of warp-lang
 
 # Functions by name ------------------------------------------------------------------------------
 
@@ -116,7 +117,7 @@ def digest(*parts: Any) -> str:
     def text(value: Any) -> str:
         if isinstance(value, wp.Function):
             return native_name(value)
-        if isinstance(value, Struct):
+        if wp.types.type_is_struct(value):
             return value.key + value.hash.hex()
         if isinstance(value, wp.array):
             return f"array{value.ndim} of {text(value.dtype)}"
