@@ -10,11 +10,11 @@ import warp as wp
 
 from .. import validate
 from ..kernels.engine.loops import Periodicity, box_type
-from ..kernels.precision import PRECISIONS
+from ..kernels.precision import PRECISIONS, structure
+from ..kernels.self_check import fast_ways
 from ..scene.group import select
 from ..scene.scene import Scene
 from ..scene.settings import Settings
-from .structs import parameter_struct
 
 
 def choose_device(device: Any) -> Any:
@@ -97,7 +97,7 @@ class Model:
     @property
     def vectorised(self) -> bool:
         """Loops over pairs are C++ for the CPU's vector units, rather than Warp's own."""
-        return bool(self.device.is_cpu)
+        return self.device.is_cpu and fast_ways()
 
     def _attributes(self) -> dict[str, int | None]:
         result: dict[str, int | None] = {}
@@ -153,7 +153,7 @@ class Model:
             else precision.vec3 if np.ndim(column) == 2 else precision.scalar
             for key, column in columns.items()
         }  # fmt: skip
-        kind = parameter_struct(name, tuple(kinds.items()))
+        kind = structure(name, kinds)
         return kind, self.structures(kind, columns)
 
     def array(self, values: Any, dtype: Any) -> wp.array:

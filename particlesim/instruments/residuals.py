@@ -41,13 +41,9 @@ def _residuals(constraint: Any, sim: Source) -> tuple[np.ndarray, np.ndarray] | 
 def _of_tuples(constraint: Constraint, sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
     if not constraint.count:
         return None
-    model, tuples = sim.model, constraint.tuples
-    kernel = kernels.tuples_kernel(
-        constraint.evaluation(model, tuples.Item), model.precision, model.periodic,
-        "position_error" in sim.state, tuples.size, tuples.Item, constraint.relative,
-    )  # fmt: skip
-    inputs = [model.box, constraint.struct, constraint.bodies]
-    return _run(kernel, constraint.count, inputs, sim), tuples.world
+    kernel = kernels.tuples_kernel(constraint.tuples.solved(constraint, sim.state))
+    inputs = [sim.model.box, constraint.struct, constraint.bodies]
+    return _run(kernel, constraint.count, inputs, sim), constraint.tuples.world
 
 
 @_residuals.register(Boundary)

@@ -174,7 +174,7 @@ def compile_for_cuda(kernel, folder):
 def registered():
     """Names of all kernels in the sources, but those that are for the CPU only."""
     names = set()
-    for path in Path(kernels.__file__).parent.glob("*.py"):
+    for path in Path(kernels.__file__).parent.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.FunctionDef):
                 decorators = " ".join(map(ast.unparse, node.decorator_list))
