@@ -1,7 +1,6 @@
 """By how much constraints are missed at the present positions."""
 
 import functools
-from typing import Any
 
 import warp as wp
 

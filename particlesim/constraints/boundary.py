@@ -10,10 +10,9 @@ import warp as wp
 
 from .. import validate
 from ..engine.model import Model
-from ..engine.structs import parameter_struct
 from ..interactions.arguments import Arguments
 from ..kernels.constraints import boundary_shapes as kernels
-from ..kernels.precision import FLOAT64, Precision
+from ..kernels.precision import FLOAT64, Precision, structure
 from ..scene.law import Law
 from ..scene.law import law as make_law
 from .holding import Holding
@@ -163,7 +162,7 @@ class Boundary(Holding):
             name: {wp.vec3: wp.vec3d, int: wp.int32}.get(self.law.parameters[name], wp.float64)
             for name in values
         }
-        Params = parameter_struct("DistanceParameters", tuple(kinds.items()))
+        Params = structure("DistanceParameters", kinds)
         given = Params()
         for name, value in values.items():
             setattr(given, name, kinds[name](value))
