@@ -165,6 +165,9 @@ def translate(
     return _made_once(
         copy,
         f"law_{func.__name__}_{digest}",
+        # A law that calls what is derived inside comes behind the adjoints too.
+        "grad" in func.__code__.co_names
+        or any(isinstance(v, wp.Function) and v.adj.uses_grad_call for v in used.values()),
         module=wp.get_module(func.__module__),
         overloaded_annotations=hints,
         source=source,
@@ -279,7 +282,9 @@ def structure(name: str, fields: dict[str, Any]) -> Any:
     return wp.struct(type(name, (), {"__annotations__": dict(fields), "__module__": __name__}))
 
 
-def function_from_source(source: str, namespace: dict[str, Any]) -> wp.Function:
+def function_from_source(
+    source: str, namespace: dict[str, Any], after_gradients: bool = False
+) -> wp.Function:
     """Make a Warp function of generated source; ``namespace`` holds the names it refers to."""
     name = re.search(r"def (\w+)\(", source).group(1)
     digest = _digest(source, *namespace.keys(), *namespace.values())
@@ -288,4 +293,5 @@ def function_from_source(source: str, namespace: dict[str, Any]) -> wp.Function:
     exec(compile(source, filename, "exec"), scope)
     # Warp reads the source back through inspect, which asks linecache.
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
-    return _made_once(scope[name], f"{name}_{digest}", module=wp.get_module(__name__))
+    module = wp.get_module(__name__)
+    return _made_once(scope[name], f"{name}_{digest}", after_gradients, module=module)
