@@ -7,6 +7,7 @@ from .fluid.viscosities import ArtificialViscosity
 from .gravity import Gravity
 from .lennard_jones import LennardJones
 from .pair import PairForce, PairPotential
+from .pair_sum import PairSum
 from .particle import ConstantForce, Drag, ParticleForce, UniformGravity
 from .springs import Springs
 
@@ -20,6 +21,7 @@ __all__ = [
     "LennardJones",
     "PairForce",
     "PairPotential",
+    "PairSum",
     "ParticleForce",
     "Polytrope",
     "Springs",

@@ -21,9 +21,7 @@ from ..scene.law import law as make_law
 from ..scene.part import Interaction
 from .arguments import Arguments
 from .pair_limits import collisions
-from .pair_loop import PairLoop, squared_distances
-
-OWN = {"cutoff_squared", "closest_squared"}  # parameters of every pair force
+from .pair_loop import PairLoop, check_names, squared_distances
 
 
 class Pair(Interaction):
@@ -63,12 +61,7 @@ class Pair(Interaction):
                     self.name, "law", "take the distance r as its first parameter", each.name,
                     "write def law(r, ...)",
                 )  # fmt: skip
-            taken = sorted(OWN & each.parameters.keys())
-            if taken:
-                raise validate.fail(
-                    self.name, f"parameter of {each.name}", "have a name of its own", taken[0],
-                    "rename it",
-                )  # fmt: skip
+            check_names(self.name, each)
             if "cutoff" in each.parameters and self.cutoff is not None:
                 parameters = {**parameters, "cutoff": self.cutoff}
         if potential is not None:

@@ -9,13 +9,16 @@ from typing import Any, Self
 import numpy as np
 import warp as wp
 
+from .. import validate
 from ..engine.execution.launch import launch
 from ..engine.model import Model
 from ..engine.structs import filled, structure_of
 from ..kernels.interactions.pair import pair_kernel
+from ..scene.law import Law
 
 # Closer than this, particles count as coincident: in parts of the cutoff, and without a cutoff.
 COINCIDENT, CLOSEST = 1e-6, 1e-12
+OWN = {"cutoff_squared", "closest_squared"}  # parameters of every loop
 
 
 @dataclass
@@ -78,3 +81,11 @@ def squared_distances(model: Model, cutoff: np.ndarray | None) -> dict[str, np.n
         columns = {"cutoff_squared": most, "closest_squared": CLOSEST**2}
         return {name: np.full(model.world_count, value) for name, value in columns.items()}
     return {"cutoff_squared": cutoff**2, "closest_squared": (COINCIDENT * cutoff) ** 2}
+
+
+def check_names(owner: str, law: Law) -> None:
+    """Refuse a law whose parameters are called like those of the loop itself."""
+    for name in sorted(OWN & law.parameters.keys()):
+        raise validate.fail(
+            owner, f"parameter of {law.name}", "have a name of its own", name, "rename it"
+        )
