@@ -148,5 +148,5 @@ def test_a_number_is_not_added_to_a_force(refused):
     scene.add_particles([(0, 0, 0)])
     scene.add_interaction(Own(number))
     sim = ps.Simulation(scene, device="cpu")
-    with refused("Own.PairSum: array must hold .particles, numbers. = .1, 1., got \(1, 3\)"):
+    with refused("Own.PairSum: array must hold .particles, numbers. = .1, 1., got .1, 3."):
         sim.step()
