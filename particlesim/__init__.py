@@ -1,8 +1,28 @@
-"""particlesim: a general particle-physics framework on NVIDIA Warp."""
+"""particlesim: a general particle-physics framework on NVIDIA Warp.
+
+A scene is particles, interactions and constraints; a simulation moves it. The rooms, from the
+ground up, each of which knows only those below it:
+
+    kernels         Warp functions and kernels, by the same subjects
+    scene           what there is: particles, abstract parts, laws, settings, samples; NumPy only
+    engine          model, state, neighbour lists, the loop, integrators, how frames are run
+    interactions    forces, one file a kind, with what limits its step
+    constraints     XPBD, one file a kind, with what limits its step
+    instruments     what measures and watches: diagnostics, ledger, watchdog, stability
+    output          files: recordings, USD and its tools, histories, surfaces, checkpoints
+    pictures        stills, films and the live view
+    simulation      Simulation: a face over all of these, and running with a recording
+    accuracy        speed against accuracy: trade-offs, tuning, stress
+    commands        the command line
+
+Public names are listed in ``__init__.pyi`` and loaded when first used.
+"""
 
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+
+import lazy_loader
 
 
 def _adopt(name: str) -> None:
@@ -22,89 +42,4 @@ def _adopt(name: str) -> None:
 _adopt("kernels")
 _adopt("scenes")
 
-from .accuracy.stress.sweep import stress
-from .accuracy.stress.table import Stress
-from .accuracy.tradeoff.sweep import tradeoff
-from .accuracy.tradeoff.table import Tradeoff
-from .accuracy.tune.report import Tuned
-from .accuracy.tune.tuning import tune
-from .constraints.boundary import BoxBoundary, PlaneBoundary, SphereBoundary
-from .constraints.constraint import Constraint
-from .constraints.contact import Contact
-from .constraints.distance import Distance
-from .constraints.force import ConstraintForce
-from .instruments.ledger.ledger import Ledger
-from .instruments.stability.check import StabilityWarning
-from .instruments.stability.report import Stability
-from .instruments.watchdog.incident import Incident, SimulationError, SimulationWarning
-from .interactions.fluid.equations_of_state import EquationOfState, Polytrope, Tait
-from .interactions.fluid.sph import SPH
-from .interactions.fluid.viscosities import ArtificialViscosity, Viscosity
-from .interactions.gravity import Gravity
-from .interactions.lennard_jones import LennardJones
-from .interactions.pair import PairForce, PairPotential
-from .interactions.pair_sum import PairSum
-from .interactions.particle import ConstantForce, Drag, ParticleForce, UniformGravity
-from .interactions.springs import Springs
-from .output.history.writer import History, read_history
-from .output.surface.surface import Surface
-from .output.usd.recorder import UsdRecorder
-from .pictures.render.camera import Camera
-from .scene import __version__, sample
-from .scene.group import Group
-from .scene.law import Law, law
-from .scene.part import Interaction
-from .scene.scene import Scene
-from .scene.settings import Settings
-from .simulation.simulation import Simulation
-
-__all__ = [
-    "SPH",
-    "ArtificialViscosity",
-    "BoxBoundary",
-    "Camera",
-    "ConstantForce",
-    "Constraint",
-    "ConstraintForce",
-    "Contact",
-    "Distance",
-    "Drag",
-    "EquationOfState",
-    "Gravity",
-    "Group",
-    "History",
-    "Incident",
-    "Interaction",
-    "Law",
-    "Ledger",
-    "LennardJones",
-    "PairForce",
-    "PairPotential",
-    "PairSum",
-    "ParticleForce",
-    "PlaneBoundary",
-    "Polytrope",
-    "Scene",
-    "Settings",
-    "Simulation",
-    "SimulationError",
-    "SimulationWarning",
-    "SphereBoundary",
-    "Springs",
-    "Stability",
-    "StabilityWarning",
-    "Stress",
-    "Surface",
-    "Tait",
-    "Tradeoff",
-    "Tuned",
-    "UniformGravity",
-    "UsdRecorder",
-    "Viscosity",
-    "law",
-    "read_history",
-    "sample",
-    "stress",
-    "tradeoff",
-    "tune",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import difflib
+import importlib
 from collections.abc import Iterable
 from typing import Any
 
@@ -155,6 +156,21 @@ def known(owner: str, given: Iterable[str], names: Iterable[str], what: str = "a
             raise TypeError(
                 f"{owner}: {what} must be one of {allowed}, got {name!r}; {suggest(name, names)}."
             )
+
+
+def installed(owner: str, module: str, extra: str) -> Any:
+    """A module of an optional package, which the extra of this name installs.
+
+    Raises:
+        ImportError: It is not there.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        package = module.partition(".")[0]
+        raise ImportError(
+            f"{owner}: {package} must be installed, got none; pip install 'particlesim[{extra}]'."
+        ) from None
 
 
 def suggest(value: Any, names: list[str]) -> str:

@@ -112,7 +112,7 @@ def _recorded(sim: Any, request: Request, path: Path) -> Path:
 
 
 def _render_file(path: Path, name: str, request: Request, meter: Meter) -> str:
-    from ..output.usd_tools.recording import Recording
+    from ..output.usd.recording import Recording
     from ..pictures.render.paint import Paint, check_field, spanned
 
     recording = Recording(OWNER, path)
@@ -151,7 +151,7 @@ def _pictures(
     recording: Any, frames: list[float], paint: Any, request: Request, stack: ExitStack
 ) -> Iterator[np.ndarray]:
     """The pictures of the frames, by Warp."""
-    from ..output.usd_tools.recording import PORTION, Recording
+    from ..output.usd.recording import PORTION, Recording
     from ..pictures.render.look import Look
     from ..pictures.render.preview import ground_height
     from ..pictures.render.renderer import Renderer

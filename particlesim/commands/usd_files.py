@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..output.usd_tools.check import check
-from ..output.usd_tools.info import info
-from ..output.usd_tools.pack import pack
+from ..output.usd.checking.check import check
+from ..output.usd.info import info
+from ..output.usd.pack import pack
 
 
 def show(path: Path) -> str:

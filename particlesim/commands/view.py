@@ -69,7 +69,7 @@ def _source(
 
 def fields_of(sim: Any, color: str | None) -> list[str]:
     """What to record besides speed, which every recording has: densities, and what is asked for."""
-    from ..output.usd.fields import readable
+    from ..output.fields import readable
 
     wanted = ["density", *([color] if color not in (None, "speed") else [])]
     return [name for name in dict.fromkeys(wanted) if name in readable(sim) or name == color]

@@ -5,17 +5,43 @@ from __future__ import annotations
 from typing import Any
 
 from ..kernels.engine.integrate import integration_kernels, motion_type, tick_kernel
+from ..scene.settings import INTEGRATORS, Settings
 from .execution.launch import launch
 from .model import Model
 from .state import State
 
 
 class Integrator:
-    """Moves particles. ``begin`` comes before the forces of a substep, the others after them."""
+    """Moves particles; the base of ready integrators and of your own.
 
-    name: str
-    order: int  # of convergence in dt
-    carries_forces = False  # a substep starts from the forces that the last one ended with
+    A substep of ``dt`` is ``begin``; the interactions' forces at the positions that it leaves;
+    ``advance``; the constraints; ``finish``. A member says what happens in ``begin`` and
+    ``advance``, made of :meth:`kick`, :meth:`drift` and :meth:`move`. Its class is given to the
+    settings, ``Settings(integrator=YourClass)``, and ``model`` and ``state`` are there to be read.
+
+    ``order`` is that of convergence in ``dt``. ``carries_forces`` says that a substep starts from
+    the forces that the last one ended with; such a method takes no constraints.
+
+    Example:
+        >>> from particlesim import Scene, Settings, Simulation
+        >>> class PositionVerlet(Integrator):
+        ...     order = 2
+        ...
+        ...     def begin(self, dt):
+        ...         self.drift(0.5 * dt)
+        ...
+        ...     def advance(self, dt):
+        ...         self.move(dt, 0.5 * dt)
+        >>> scene = Scene()
+        >>> ball = scene.add_particles([(0, 0, 0)], velocity=(1, 0, 0))
+        >>> sim = Simulation(scene, Settings(dt=0.5, integrator=PositionVerlet), device="cpu")
+        >>> sim.step()
+        >>> sim.position.tolist()
+        [[0.5, 0.0, 0.0]]
+    """
+
+    order: int = 1
+    carries_forces = False
 
     def __init__(self, model: Model, state: State, *, constrained: bool, remember: bool):
         self.model, self.state, self.count = model, state, model.particle_count
@@ -39,11 +65,16 @@ class Integrator:
         )
         self.motion = _motion(model, state)
 
+    @property
+    def name(self) -> str:
+        """What reports call it."""
+        return next((n for n, each in METHODS.items() if each is type(self)), type(self).__name__)
+
     def begin(self, dt: float) -> None:
         """Before the forces."""
 
     def advance(self, dt: float) -> None:
-        """After the forces."""
+        """After the forces, which are in ``state.force``."""
         raise NotImplementedError
 
     def finish(self, dt: float) -> None:
@@ -54,12 +85,21 @@ class Integrator:
         if self.constrained and dt > 0:
             self._launch(self.kernels.follow_corrections, 1.0 / dt)
 
-    def _move(self, dt_kick: float, dt: float) -> None:
-        """v += w f dt_kick; x += v dt. The clock goes with the positions."""
-        self._launch(self.kernels.advance, dt_kick, dt)
+    def kick(self, dt: float) -> None:
+        """v += w f dt, w = 1/m; nothing in a scene without forces."""
+        if self.forces:
+            self._launch(self.kernels.kick_only, dt)
+
+    def drift(self, dt: float) -> None:
+        """x += v dt, into the periodic box. The clock goes with the positions."""
+        self.move(0.0, dt)
+
+    def move(self, kick: float, drift: float) -> None:
+        """v += w f kick; x += v drift, in one launch. The clock goes with the positions."""
+        self._launch(self.kernels.advance, kick, drift)
         if "time" in self.state:
             model = self.model
-            launch(tick_kernel(), model.world_count, [dt, self.state.time], model.device)
+            launch(tick_kernel(), model.world_count, [drift, self.state.time], model.device)
 
     def _launch(self, kernel: Any, *scalars: float) -> None:
         launch(kernel, self.count, [*scalars, self.motion], self.model.device)
@@ -68,10 +108,10 @@ class Integrator:
 class SymplecticEuler(Integrator):
     """v += w f dt; x += v dt. First order, symplectic; the integrator that XPBD builds on."""
 
-    name, order = "symplectic_euler", 1
+    order = 1
 
     def advance(self, dt: float) -> None:
-        self._move(dt, dt)
+        self.move(dt, dt)
 
 
 class VelocityVerlet(Integrator):
@@ -81,18 +121,36 @@ class VelocityVerlet(Integrator):
     that depend on velocity see it after the first kick.
     """
 
-    name, order = "velocity_verlet", 2
+    order = 2
     carries_forces = True
 
     def begin(self, dt: float) -> None:
-        self._move(0.5 * dt, dt)
+        self.move(0.5 * dt, dt)
 
     def advance(self, dt: float) -> None:
-        if self.forces:
-            self._launch(self.kernels.kick_only, 0.5 * dt)
+        self.kick(0.5 * dt)
 
 
-METHODS = {method.name: method for method in (SymplecticEuler, VelocityVerlet)}
+METHODS: dict[str, type[Integrator]] = dict(
+    zip(INTEGRATORS, (SymplecticEuler, VelocityVerlet), strict=True)
+)
+
+
+def method(settings: Settings) -> type[Integrator]:
+    """The class that settings name or give.
+
+    Raises:
+        TypeError: A class that is no Integrator.
+    """
+    given = settings.integrator
+    if isinstance(given, str):
+        return METHODS[given]
+    if not issubclass(given, Integrator):
+        raise TypeError(
+            f"Settings: integrator must be a name or a subclass of Integrator, got {given!r}; "
+            "derive it from particlesim.Integrator."
+        )
+    return given
 
 
 def _motion(model: Model, state: State) -> Any:

@@ -15,7 +15,7 @@ from ..scene.scene import Scene
 from ..scene.settings import Settings
 from . import batch
 from .execution.launch import owner
-from .integrators import METHODS
+from .integrators import method
 from .model import Model
 from .neighbors.lists import Neighbors
 from .observers import FINISH, FORCE, PROJECT, Observers
@@ -47,14 +47,14 @@ class Loop:
         for part in self.parts:
             part.prepare(model, self.neighbors)
         required = frozenset[str]().union(*(part.requires for part in self.parts))
-        method = METHODS[settings.integrator]
-        if self.constraints and method.carries_forces:
+        moves = method(settings)
+        if self.constraints and moves.carries_forces:
             raise validate.fail(
                 "Settings", "integrator", "be symplectic_euler in a scene with constraints",
-                settings.integrator, "or leave the constraints out",
+                settings.plain["integrator"], "or leave the constraints out",
             )  # fmt: skip
         self.state.require({"position", "velocity"} | required)
-        self.integrator = method(
+        self.integrator = moves(
             model, self.state, constrained=bool(self.constraints),
             remember="previous_position" in required,
         )  # fmt: skip

@@ -28,7 +28,7 @@ from ..instruments.watchdog.watch import Watchdog
 from ..scene import __version__
 from ..scene.fingerprint import difference, fingerprint
 from ..scene.scene import Scene
-from ..scene.settings import Settings
+from ..scene.settings import INTEGRATORS, Settings
 from . import files
 
 FORMAT, VERSION = "particlesim checkpoint", 1
@@ -47,8 +47,8 @@ class Capture:
 
 def save(frames: Frames, watchdog: Watchdog, path: str | os.PathLike[str], overwrite: bool) -> None:
     """Write the present (see :meth:`Simulation.save`)."""
-    target = _writable(path, overwrite)
-    _publish(target, capture(frames, watchdog))
+    target = files.check_new("Simulation.save", path, overwrite, suffixes=(".npz",))
+    write(capture(frames, watchdog), target)
 
 
 def capture(
@@ -73,26 +73,12 @@ def capture(
         "unknown_forces": sorted(loop.unknown_forces),
         "frozen": sorted(watchdog.frozen),
         "incidents": [dataclasses.asdict(incident) for incident in watchdog.incidents],
-        "settings": dataclasses.asdict(loop.settings),
+        "settings": loop.settings.plain,
         "copies": all(scene is loop.scenes[0] for scene in loop.scenes),
         "scenes": fingerprint(loop.scenes) if scenes is None else scenes,
         "arrays": list(arrays),
     }
     return Capture(header, arrays)
-
-
-def write(capture: Capture, path: Path) -> None:
-    """Write a captured checkpoint in the place of the one before; touches no simulation."""
-    _publish(path, capture)
-
-
-def read(path: Path) -> Capture:
-    """What a file holds.
-
-    Raises:
-        ValueError: It is damaged, newer or no checkpoint. OSError: It cannot be read.
-    """
-    return Capture(*_read(path))
 
 
 def restore(frames: Frames, watchdog: Watchdog, saved: Capture, source: Path) -> None:
@@ -137,13 +123,22 @@ def _settings(source: Path, saved: dict[str, Any], given: Settings | None) -> Se
     known = {field.name for field in dataclasses.fields(Settings)}
     if not known >= saved.keys():
         raise _unfit(source, f"has the unknown knobs {sorted(saved.keys() - known)}")
-    settings = Settings(**saved)
-    if given is None:
-        return settings
-    if not isinstance(given, Settings):
+    if given is not None and not isinstance(given, Settings):
         raise TypeError(
             f"Simulation.load: settings must be a Settings, got {given!r}; use Settings(...)."
         )
+    method = None if given is None else given.integrator
+    if isinstance(method, type) and method.__name__ == saved["integrator"]:
+        saved = {**saved, "integrator": method}
+    elif saved["integrator"] not in INTEGRATORS:
+        raise validate.fail(
+            "Simulation.load", "settings.integrator",
+            f"be the {saved['integrator']} of {source.name!r}", method,
+            "give settings with that class",
+        )  # fmt: skip
+    settings = Settings(**saved)
+    if given is None:
+        return settings
     if given.automatic:
         given = given.replace(dt=settings.dt, substeps=settings.substeps)
     for name in FIXED:
@@ -190,39 +185,20 @@ def _unfit(source: Path, how: str) -> ValueError:
 # The file ------------------------------------------------------------------------------------
 
 
-def _writable(path: str | os.PathLike[str], overwrite: bool) -> Path:
-    """``path``, checked before any work is done for it."""
-    owner, target = "Simulation.save", Path(path)
-    if target.suffix != ".npz":
-        raise validate.fail(
-            owner, "path", "end in .npz", str(target), f"name it {target.with_suffix('.npz').name}"
-        )
-    if not target.parent.is_dir():
-        raise FileNotFoundError(
-            f"{owner}: path must be in an existing folder, got {str(target)!r}; "
-            f"make {str(target.parent)!r} first."
-        )
-    if target.is_dir():
-        raise IsADirectoryError(
-            f"{owner}: path must be a file, got the folder {str(target)!r}; choose another name."
-        )
-    if target.exists() and not overwrite:
-        raise FileExistsError(
-            f"{owner}: path must be new, got {str(target)!r}, which exists; choose another, or "
-            "pass overwrite=True."
-        )
-    return target
-
-
-def _publish(target: Path, capture: Capture) -> None:
+def write(capture: Capture, path: Path) -> None:
+    """Write a captured checkpoint in the place of the one before; touches no simulation."""
     text = json.dumps(capture.header, default=lambda number: number.item()).encode()
     arrays = {HEADER: np.frombuffer(text, np.uint8), **capture.arrays}
-    with files.whole("Simulation.save", target, "What was saved before is kept.") as temporary:
+    with files.whole("Simulation.save", path, "What was saved before is kept.") as temporary:
         files.write_arrays(temporary, arrays, sync=True)
 
 
-def _read(source: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Header and arrays of a file, every byte of them checked."""
+def read(source: Path) -> Capture:
+    """What a file holds, every byte of it checked.
+
+    Raises:
+        ValueError: It is damaged, newer or no checkpoint. OSError: It cannot be read.
+    """
     owner = "Simulation.load"
     try:
         file = open(source, "rb")  # noqa: SIM115, what fails within is told apart
@@ -239,7 +215,7 @@ def _read(source: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
                     raise ValueError(f"format {header['format']!r}")
                 if header["format_version"] <= VERSION:
                     names = header["arrays"]
-                    return header, {name: _entry(archive, f"{name}.npy") for name in names}
+                    return Capture(header, {name: _entry(archive, f"{name}.npy") for name in names})
         except Exception as error:  # bytes may be anything, and their readers raise as much
             raise ValueError(
                 f"{owner}: path must be a whole checkpoint written by Simulation.save, got "

@@ -1,19 +1,74 @@
-"""Files that appear whole or not at all, whatever ends the process that writes them."""
+"""Files that appear whole or not at all, and the refusal of those that would be lost."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import zipfile
-from collections.abc import Iterator, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
+from .. import validate
+
+FREE = "free some space or choose another folder"
+
+
+def check_new(
+    owner: str,
+    path: str | os.PathLike[str],
+    overwrite: bool,
+    *,
+    suffixes: Collection[str] = (),
+    beside: Iterable[Path] = (),
+    argument: str = "path",
+    consent: str = "pass overwrite=True",
+) -> Path:
+    """The path, if an output can be written there and nothing is lost; before any work is done.
+
+    Args:
+        owner: Whom an error names.
+        path: The output.
+        overwrite: What exists may be replaced.
+        suffixes: What the name may end in, in either case; none: anything.
+        beside: Further files and folders that the output is made of.
+        argument: What an error calls the path.
+        consent: How an error says to ask for replacing.
+
+    Raises:
+        ValueError: Another suffix. FileNotFoundError: The folder does not exist.
+        IsADirectoryError: The path is a folder. FileExistsError: Something of the output exists.
+
+    Example:
+        >>> check_new("History", "run.csv", False, suffixes=(".csv", ".jsonl")).name
+        'run.csv'
+    """
+    target, shown = Path(path), str(path)
+    if suffixes and target.suffix.lower() not in suffixes:
+        raise validate.fail(owner, argument, f"end in {', '.join(suffixes)}", shown, "name it so")
+    if not target.parent.is_dir():
+        raise FileNotFoundError(
+            f"{owner}: {argument} must be in an existing folder, got {shown!r}; "
+            f"make {str(target.parent)!r} first."
+        )
+    if target.is_dir():
+        raise IsADirectoryError(
+            f"{owner}: {argument} must be a file, got the folder {shown!r}; choose another name."
+        )
+    existing = () if overwrite else [each for each in (target, *beside) if each.exists()]
+    if existing:
+        raise FileExistsError(
+            f"{owner}: {argument} must be a new file, got {shown!r} where {existing[0].name!r} "
+            f"exists; choose another, or {consent}."
+        )
+    return target
+
 
 @contextlib.contextmanager
-def whole(owner: str, target: Path, kept: str) -> Iterator[Path]:
+def whole(owner: str, target: Path, kept: str = "") -> Iterator[Path]:
     """Yield a temporary name beside ``target``; what was written there then takes its place.
 
     Args:
@@ -33,10 +88,15 @@ def whole(owner: str, target: Path, kept: str) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
         if not isinstance(error, OSError):
             raise
-        raise type(error)(
-            f"{owner}: {str(target)!r} must be writable, got {error}; free some space or "
-            f"choose another folder. {kept}"
-        ) from error
+        raise unwritable(owner, target, error, kept) from error
+
+
+def unwritable(
+    owner: str, target: Path, error: Exception, kept: str = "", remedy: str = FREE
+) -> OSError:
+    """The error of a file that could not be written, for the caller to raise; ``kept`` as above."""
+    kind = type(error) if isinstance(error, OSError) else OSError
+    return kind(f"{owner}: {str(target)!r} must be writable, got {error}; {remedy}. {kept}".strip())
 
 
 def make_folder(owner: str, folder: Path) -> None:
@@ -48,9 +108,7 @@ def make_folder(owner: str, folder: Path) -> None:
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
-        raise type(error)(
-            f"{owner}: {str(folder)!r} must be writable, got {error}; choose another folder."
-        ) from error
+        raise unwritable(owner, folder, error, remedy="choose another folder") from error
 
 
 def write_arrays(path: Path, arrays: Mapping[str, Any], *, sync: bool = False) -> None:
@@ -71,3 +129,21 @@ def write_arrays(path: Path, arrays: Mapping[str, Any], *, sync: bool = False) -
         file.flush()
         if sync:
             os.fsync(file.fileno())
+
+
+class Closing(ABC):
+    """Something to be closed at the end of a ``with``; of several errors the first is raised."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Finish. May be called again."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        try:
+            self.close()
+        except Exception:
+            if error is None:
+                raise

@@ -19,25 +19,10 @@ class Meter:
     @contextlib.contextmanager
     def measure(self, label: str, sim: Any, frames: int) -> Iterator[Callable[[int, int], None]]:
         """Show a bar while the simulation runs; yields what it calls after every frame."""
-        from rich.console import Console
-        from rich.progress import (
-            BarColumn,
-            MofNCompleteColumn,
-            Progress,
-            TextColumn,
-            TimeRemainingColumn,
-        )
-
         self.label, self.frames, self.particles = label, frames, sim.particle_count
         self.work = self.particles * sim.settings.substeps
-        columns = [
-            TextColumn("{task.description}", markup=False),
-            BarColumn(), MofNCompleteColumn(), TextColumn("frames"),
-            TextColumn("{task.fields[detail]}", markup=False), TimeRemainingColumn(),
-        ]  # fmt: skip
-        console = Console(stderr=True)
         self.started = time.perf_counter()
-        with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        with _progress("frames", "{task.fields[detail]}") as bar:
             count = f"{self.particles:,} particles"
             task = bar.add_task(f"{label}: compiling", total=frames, detail=count)
 
@@ -71,24 +56,27 @@ class Meter:
 @contextlib.contextmanager
 def bar(label: str, unit: str) -> Iterator[Callable[[int, int, str], None]]:
     """Show a bar on a terminal; yields what is called with (done, total, what is being done)."""
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    columns = [
-        TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(),
-        TextColumn(unit), TimeRemainingColumn(),
-    ]  # fmt: skip
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+    with _progress(unit) as progress:
         task = progress.add_task(f"{label}: compiling", total=None)
 
         def show(done: int, total: int, doing: str) -> None:
             progress.update(task, completed=done, total=total, description=f"{label}: {doing}")
 
         yield show
+
+
+@contextlib.contextmanager
+def _progress(*texts: str) -> Iterator[Any]:
+    """A line on a terminal: what is done, a bar, texts, and when it will be over."""
+    from rich import progress
+    from rich.console import Console
+
+    name, *columns = (
+        progress.TextColumn(text, markup=False) for text in ("{task.description}", *texts)
+    )
+    counted = [name, progress.BarColumn(), progress.MofNCompleteColumn(), *columns]
+    console = Console(stderr=True)
+    with progress.Progress(
+        *counted, progress.TimeRemainingColumn(), console=console, disable=not console.is_terminal
+    ) as shown:
+        yield shown

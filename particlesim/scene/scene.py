@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import validate
 from .bounds import corners, periodic_box
-from .group import PALETTE, Group
+from .group import PALETTE, Color, Group
 from .part import ConstraintBase, Interaction
 
 # Names of the engine's own per-particle arrays, which attributes of a scene cannot take.
@@ -110,6 +110,15 @@ class Scene:
         _bounded(owner, "pinned", held, (held == 0) | (held == 1), "True or False", "choose one")
         for key, value in attributes.items():
             columns[key] = self._attribute(owner, key, value, count)
+        chosen = self._color(owner, color)
+        self._append(columns, count)
+        stop = self.particle_count
+        result = Group(self, name, stop - count, stop, chosen, surface)
+        self.groups.append(result)
+        return result
+
+    def _append(self, columns: dict[str, np.ndarray], count: int) -> None:
+        """Rows for so many more particles; what some have and others not is zero for these."""
         for key, column in columns.items():
             if key not in self._columns:
                 width = column.shape[1] if column.ndim == 2 else None
@@ -120,17 +129,16 @@ class Scene:
             width = self._widths[key]
             shape = (count,) if width is None else (count, width)
             parts.append(columns.get(key, np.zeros(shape)))
-        chosen = PALETTE[len(self.groups) % len(PALETTE)]
-        if color is not None:
-            rgb = validate.vector(owner, "color", color)
-            _bounded(owner, "color", rgb, (rgb >= 0) & (rgb <= 1), "from 0 to 1", "scale it")
-            red, green, blue = rgb
-            chosen = (float(red), float(green), float(blue))
-        start = self.particle_count
-        result = Group(self, name, start, start + count, chosen, surface)
-        self.groups.append(result)
         self.particle_count += count
-        return result
+
+    def _color(self, owner: str, color: Any) -> Color:
+        """The colour given, or the next of the palette."""
+        if color is None:
+            return PALETTE[len(self.groups) % len(PALETTE)]
+        rgb = validate.vector(owner, "color", color)
+        _bounded(owner, "color", rgb, (rgb >= 0) & (rgb <= 1), "from 0 to 1", "scale it")
+        red, green, blue = rgb
+        return (float(red), float(green), float(blue))
 
     def _attribute(self, owner: str, key: str, value: Any, count: int) -> np.ndarray:
         if key in RESERVED:

@@ -30,7 +30,8 @@ class Settings:
         iterations: Sweeps over the constraints a substep (XPBD). Compliant constraints do not
             depend on it; stiff ones come closer to C = 0.
         integrator: ``"symplectic_euler"`` (first order, any scene) or ``"velocity_verlet"``
-            (second order, scenes without constraints).
+            (second order, scenes without constraints), or a class of your own derived from
+            :class:`particlesim.Integrator`.
         precision: ``"float32"`` or ``"float64"``, in every kernel.
         skin: Added to the cutoff of neighbour lists [length]; they are rebuilt when a particle has
             moved half of it. Changes the cost, not the forces. None: 0.12 of the cutoff, 0.2 of
@@ -69,7 +70,7 @@ class Settings:
     dt: float | Any = 1.0 / 60.0  # or AUTO
     substeps: int | Any = 10  # or AUTO
     iterations: int = 1
-    integrator: str = "symplectic_euler"
+    integrator: str | type = "symplectic_euler"
     precision: str = "float32"
     skin: float | None = None
     compensated: bool = True
@@ -108,7 +109,8 @@ class Settings:
             checked["dt"] = validate.number(owner, "dt", self.dt, minimum=0.0, unit="s")
         if "substeps" not in chosen:
             checked["substeps"] = validate.whole(owner, "substeps", self.substeps, minimum=1)
-        validate.choice(owner, "integrator", self.integrator, INTEGRATORS)
+        if not isinstance(self.integrator, type):
+            validate.choice(owner, "integrator", self.integrator, INTEGRATORS)
         validate.choice(owner, "precision", self.precision, PRECISIONS)
         validate.choice(owner, "execution", self.execution, EXECUTIONS)
         validate.choice(owner, "on_failure", self.on_failure, ON_FAILURE)
@@ -131,6 +133,14 @@ class Settings:
     def automatic(self) -> bool:
         """Whether dt or substeps are yet to be chosen, by the simulation."""
         return _is_auto(self.dt) or _is_auto(self.substeps)
+
+    @property
+    def plain(self) -> dict[str, Any]:
+        """The knobs by name, as they can be written down: an integrator of one's own by its name."""
+        values = dataclasses.asdict(self)
+        if isinstance(self.integrator, type):
+            values["integrator"] = self.integrator.__name__
+        return values
 
     @property
     def substep(self) -> float:

@@ -8,7 +8,6 @@ was called, with ``resume=True``: what was given is compared with what is kept, 
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import time
 import zlib
@@ -52,9 +51,7 @@ class Checkpoints:
         self._arguments = _plain(
             {
                 "settings": {
-                    name: value
-                    for name, value in dataclasses.asdict(sim.settings).items()
-                    if name not in FREE
+                    name: value for name, value in sim.settings.plain.items() if name not in FREE
                 },
                 "device": "cpu" if sim.device.is_cpu else "cuda",
                 "start": {"frame": sim.frame, "state": _checksum(sim)},

@@ -9,7 +9,8 @@ from typing import Any, Self
 
 from .. import validate
 from ..instruments.watchdog.incident import SimulationError
-from ..output.history.writer import History, check_output
+from ..output import files
+from ..output.history.writer import SUFFIXES, History
 from ..output.progress import Meter
 from ..output.recorders import open_recorder
 from ..output.recorders.background import BackgroundWriter
@@ -33,7 +34,7 @@ def run(
     """Advance by ``frames`` frames (see :meth:`Simulation.run`)."""
     first = sim.frame
     if history is not None:
-        check_output("History", Path(history), overwrite or resume)
+        files.check_new("History", history, overwrite or resume, suffixes=SUFFIXES)
     with contextlib.ExitStack() as stack:
         recording = measured = None
         if record is not None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -87,7 +86,7 @@ def plot_history(
     """Draw a history: a panel each for what is asked for, worlds as lines.
 
     Args:
-        history: The file, or what :func:`particlesim.output.history.writer.read_history` made of it.
+        history: The file, or what :func:`~particlesim.read_history` made of it.
         path: The picture, ``.png``, ``.svg`` or ``.pdf``.
         what: Of ``"energy"``, ``"drift"``, ``"momentum"``, ``"angular_momentum"``,
             ``"potential"``, ``"density"``, ``"residual"``; None: all that the history has.
@@ -109,27 +108,13 @@ def plot_history(
         >>> plot_history("ball.csv", "ball.png", ["energy", "momentum"])
         ['energy', 'momentum']
     """
-    target = Path(path)
-    check_picture(target, overwrite)
+    target = files.check_new(OWNER, path, overwrite, suffixes=FORMATS)
     record = history if isinstance(history, Record) else read_history(history)
     panels = chosen(record, what)
     drawn = figure(record, list(panels.values()))
-    with files.whole(OWNER, target, "") as part:
+    with files.whole(OWNER, target) as part:
         drawn.savefig(part, format=target.suffix.lower()[1:], dpi=150)
     return list(panels)
-
-
-def check_picture(path: Path, overwrite: bool) -> None:
-    """Refuse a picture that cannot be drawn."""
-    if path.suffix.lower() not in FORMATS:
-        raise validate.fail(
-            OWNER, "path", f"end in {', '.join(FORMATS)}", str(path), "choose one of these"
-        )
-    if path.exists() and not overwrite:
-        raise FileExistsError(
-            f"{OWNER}: path must be a new file, got {str(path)!r}, which exists; "
-            "choose another or overwrite it."
-        )
 
 
 def chosen(record: Record, what: Sequence[str] | None) -> dict[str, Panel]:
@@ -150,7 +135,9 @@ def chosen(record: Record, what: Sequence[str] | None) -> dict[str, Panel]:
 
 def figure(record: Record, panels: Sequence[Panel]) -> Any:
     """A matplotlib figure of the panels, one below the other."""
-    drawn = _figure_class()(figsize=(7.0, 0.6 + 2.2 * len(panels)), layout="constrained")
+    # A Figure of its own needs no display.
+    Figure = validate.installed(OWNER, "matplotlib.figure", "plot").Figure
+    drawn = Figure(figsize=(7.0, 0.6 + 2.2 * len(panels)), layout="constrained")
     axes = drawn.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
     for each, panel in zip(axes, panels, strict=True):
         _draw(each, record, panel)
@@ -193,14 +180,3 @@ def _family(record: Record, prefix: str) -> dict[str, np.ndarray]:
         for name, values in record.values.items()
         if name.startswith(prefix)
     }
-
-
-def _figure_class() -> Any:
-    """matplotlib's Figure, which needs no display."""
-    try:
-        from matplotlib.figure import Figure
-    except ModuleNotFoundError:
-        raise ImportError(
-            f"{OWNER}: matplotlib must be installed, got none; pip install 'particlesim[plot]'."
-        ) from None
-    return Figure

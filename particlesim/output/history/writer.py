@@ -16,7 +16,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -29,14 +29,15 @@ SUFFIXES = (".csv", ".jsonl")
 OWN = ("frame", "time", "world")  # what every line starts with
 
 
-class History:
+class History(files.Closing):
     """Records what a simulation did, frame by frame.
 
     Columns: ``mass``, ``momentum_x``, ``angular_momentum_x`` (and y, z), ``kinetic``,
     ``potential``, ``energy``; ``potential:<interaction>`` of each that has one;
     ``density_error_max:<fluid>`` and ``density_error_rms:<fluid>`` of rho / rho0 - 1, where there
     is a rest density; ``residual_max:<constraint>`` and ``residual_rms:<constraint>`` (see
-    :mod:`particlesim.instruments.residuals`). A run with a history goes as one without, bit for bit.
+    :mod:`particlesim.instruments.residuals`). A run with a history goes as one without, bit for
+    bit.
 
     Args:
         sim: The simulation.
@@ -70,8 +71,8 @@ class History:
         overwrite: bool = False,
         resume: bool = False,
     ):
-        self.sim, self.path = sim, Path(path)
-        check_output("History", self.path, overwrite or resume)
+        self.sim = sim
+        self.path = files.check_new("History", path, overwrite or resume, suffixes=SUFFIXES)
         self.overwrite = overwrite and not resume
         self._file: io.FileIO | None = None
         self._columns: list[str] | None = None
@@ -101,17 +102,11 @@ class History:
             self._file.close()
             self._file = None
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self.close()
-
     def _begin(self, columns: list[str]) -> None:
         if self._columns is None:
-            check_output("History", self.path, self.overwrite)
+            files.check_new("History", self.path, self.overwrite)
             self._columns = columns
-            heading = ",".join(columns) + "\n" if self.path.suffix == ".csv" else ""
+            heading = ",".join(columns) + "\n" if _is_csv(self.path) else ""
             self.path.write_text(heading, encoding="utf-8")
         elif self._columns != columns:
             raise validate.fail(
@@ -121,7 +116,7 @@ class History:
         self._file = open(self.path, "ab", buffering=0)  # noqa: SIM115  closed by close()
 
     def _line(self, row: list[Any]) -> str:
-        if self.path.suffix == ".csv":
+        if _is_csv(self.path):
             return ",".join(map(repr, row)) + "\n"
         pairs = zip(self._columns or (), row, strict=True)
         plain = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in pairs}
@@ -137,16 +132,14 @@ class History:
         except OSError as error:
             with contextlib.suppress(OSError):
                 self._file.truncate(size)
-            raise type(error)(
-                f"History: {str(self.path)!r} must be writable, got {error}; free some space. "
-                "What was recorded before is kept."
-            ) from error
+            kept = "What was recorded before is kept."
+            raise files.unwritable("History", self.path, error, kept, "free some space") from error
 
     def _go_on(self) -> None:
         """Keep the whole frames up to the present one."""
         with open(self.path, encoding="utf-8", newline="") as file:
             lines = [line for line in file if line.endswith("\n")]
-        heading = lines[:1] if self.path.suffix == ".csv" else []
+        heading = lines[:1] if _is_csv(self.path) else []
         past = read_history(self.path)
         if past.world_count not in (0, self.sim.model.world_count):
             raise validate.fail(
@@ -187,23 +180,6 @@ class Record:
         )
 
 
-def check_output(owner: str, path: Path, may_exist: bool) -> None:
-    """Refuse a file that cannot become a history, before a long run."""
-    if path.suffix not in SUFFIXES:
-        raise validate.fail(
-            owner, "path", f"end in {', '.join(SUFFIXES)}", str(path), "choose one of these"
-        )
-    if not path.parent.is_dir():
-        raise FileNotFoundError(
-            f"{owner}: path must be in an existing folder, got {str(path)!r}; make it first."
-        )
-    if path.exists() and not may_exist:
-        raise FileExistsError(
-            f"{owner}: path must be a new file, got {str(path)!r}, which exists; "
-            "choose another or overwrite it."
-        )
-
-
 def read_history(path: str | os.PathLike[str]) -> Record:
     """Read a history: its frames that are whole.
 
@@ -213,12 +189,11 @@ def read_history(path: str | os.PathLike[str]) -> Record:
     Raises:
         FileNotFoundError: There is no such file. ValueError: It is no history.
     """
-    source = Path(path)
-    check_output("read_history", source, may_exist=True)
+    source = files.check_new("read_history", path, overwrite=True, suffixes=SUFFIXES)
     with open(source, encoding="utf-8", newline="") as file:
         lines = [line for line in file if line.endswith("\n")]  # the last may be cut off
     try:
-        rows = _csv_rows(lines) if source.suffix == ".csv" else _json_rows(lines)
+        rows = _csv_rows(lines) if _is_csv(source) else _json_rows(lines)
     except (ValueError, TypeError):
         rows = [{}]
     if any(name not in row for row in rows for name in OWN):
@@ -227,6 +202,10 @@ def read_history(path: str | os.PathLike[str]) -> Record:
             "give a file that a run wrote with --history",
         )  # fmt: skip
     return _record(rows)
+
+
+def _is_csv(path: Path) -> bool:
+    return path.suffix.lower() == ".csv"
 
 
 def _csv_rows(lines: list[str]) -> list[dict[str, float]]:

@@ -2,42 +2,25 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 from pathlib import Path
 from typing import Any
 
 from ... import validate
 from ...engine.source import Source
-from ..usd.recorder import UsdRecorder
-from .background import BackgroundWriter
-from .base import ParticleFrame, ParticleRecorder, Recorder
-from .gsd import GsdRecorder
-from .npz import NpzRecorder
-from .ply import PlyRecorder
-from .vtkhdf import VtkhdfRecorder
+from .base import ParticleRecorder, Recorder
 
-FORMATS: dict[str, Any] = {
-    ".usda": UsdRecorder,
-    ".usd": UsdRecorder,
-    ".usdc": UsdRecorder,
-    ".npz": NpzRecorder,
-    ".ply": PlyRecorder,
-    ".gsd": GsdRecorder,
-    ".vtkhdf": VtkhdfRecorder,
+# Suffix to module, in output, and class. A module is imported when its first file is opened.
+FORMATS = {
+    ".usda": "usd.recorder.UsdRecorder",
+    ".usd": "usd.recorder.UsdRecorder",
+    ".usdc": "usd.recorder.UsdRecorder",
+    ".npz": "recorders.npz.NpzRecorder",
+    ".ply": "recorders.ply.PlyRecorder",
+    ".gsd": "recorders.gsd.GsdRecorder",
+    ".vtkhdf": "recorders.vtkhdf.VtkhdfRecorder",
 }
-
-__all__ = [
-    "FORMATS",
-    "BackgroundWriter",
-    "GsdRecorder",
-    "NpzRecorder",
-    "ParticleFrame",
-    "ParticleRecorder",
-    "PlyRecorder",
-    "Recorder",
-    "VtkhdfRecorder",
-    "open_recorder",
-]
 
 
 def open_recorder(sim: Source, path: str | os.PathLike[str], **options: Any) -> Recorder:
@@ -45,9 +28,8 @@ def open_recorder(sim: Source, path: str | os.PathLike[str], **options: Any) -> 
 
     Args:
         sim: The simulation.
-        path: ``.usda``, ``.usd`` or ``.usdc`` (:class:`~particlesim.output.usd.recorder.UsdRecorder`);
-            ``.npz``, ``.ply``, ``.gsd`` or ``.vtkhdf``
-            (:class:`~particlesim.output.recorders.base.ParticleRecorder`).
+        path: ``.usda``, ``.usd`` or ``.usdc`` (:class:`~particlesim.UsdRecorder`); ``.npz``,
+            ``.ply``, ``.gsd`` or ``.vtkhdf`` (:class:`.ParticleRecorder`).
         **options: Further arguments of the recorder.
 
     Raises:
@@ -66,9 +48,10 @@ def open_recorder(sim: Source, path: str | os.PathLike[str], **options: Any) -> 
             "open_recorder", "path", f"end in one of {', '.join(FORMATS)}", str(path),
             "choose one of these",
         )  # fmt: skip
-    kind = FORMATS[suffix]
+    module, _, name = FORMATS[suffix].rpartition(".")
+    kind = getattr(importlib.import_module(f"..{module}", __name__), name)
     options = {name: value for name, value in options.items() if value is not None}
-    if kind is not UsdRecorder:
+    if issubclass(kind, ParticleRecorder):
         known = ["frames", "fields", "every", "overwrite", "resume"]
-        validate.known(f"{kind.__name__}", options, known, "option")
+        validate.known(kind.__name__, options, known, "option")
     return kind(sim, path, **options)

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, Self
+from typing import Any
+
+from .. import files
 
 DEPTH = 2  # jobs at once: one being done, and one that waits
 
 
-class BackgroundWriter:
+class BackgroundWriter(files.Closing):
     """Does jobs one after the other on a thread of its own.
 
     At most ``DEPTH`` are on their way, so that memory stays bounded; who hands out another waits.
@@ -49,17 +51,6 @@ class BackgroundWriter:
             self._wait(0)
         finally:
             self._pool.shutdown()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        try:
-            self.close()
-        except Exception:
-            if error is None:
-                raise
-            # The first error is the one to see.
 
     def _do(self, job: Callable[[], Any]) -> None:
         if self._failed:

@@ -3,43 +3,78 @@
 from __future__ import annotations
 
 import os
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any
 
 import numpy as np
 
 from ... import validate
 from ...engine.source import Source
-from ..usd.fields import ParticleFields
+from .. import files
+from ..fields import ParticleFields
 
 # What every frame has; a field cannot have these names.
 COLUMNS = ("position", "velocity", "radius", "id", "group", "world")
+KEPT = "Frames written before are kept."
 
 
-class Recorder(Protocol):
-    """Writes frames of a simulation to somewhere, each of them safe when its write returns."""
+class Recorder(files.Closing):
+    """Writes frames of a simulation to somewhere, each of them safe when its write returns.
 
-    def capture(self) -> Any:
-        """Copy to the host what the present frame needs, with its ``number``; touch no file.
+    Args:
+        sim: The simulation.
+        path: The output.
+        frames: How many more frames of the simulation are planned; more or fewer may come.
+        fields: Names of further values to write.
+        every: Record every k-th frame of the simulation; recorded frames count one by one.
+    """
 
-        None: this frame is not to be recorded.
-        """
-
-    def write_frame(self, frame: Any) -> None:
-        """Write what :meth:`capture` returned; touch no simulation. Another thread may do it."""
+    def __init__(
+        self,
+        sim: Source,
+        path: str | os.PathLike[str],
+        frames: int,
+        fields: Iterable[str],
+        every: int,
+    ):
+        self.owner = type(self).__name__
+        self.sim, self.path = sim, Path(path)
+        self.every = validate.whole(self.owner, "every", every, minimum=1)
+        self.planned_last = (sim.frame + validate.whole(self.owner, "frames", frames)) // every
+        self.fields = ParticleFields(sim, fields)
 
     def write(self) -> None:
-        """Capture and write the present frame."""
+        """Write the simulation's present state as its present frame, if that is to be recorded."""
+        self.write_frame(self.capture())
 
-    def close(self) -> None:
-        """Write what has to come at the end. May be called again."""
+    def capture(self) -> Any:
+        """Copy to the host all that the present frame needs, with its ``number``; touch no file.
 
-    def __enter__(self) -> Self: ...
+        What it returns shares nothing with the simulation: another thread may write it while the
+        simulation goes on. None: ``every`` leaves this frame out.
+        """
+        return None if self.sim.frame % self.every else self._capture()
 
-    def __exit__(self, *error: Any) -> None: ...
+    def write_frame(self, frame: Any) -> None:
+        """Write what :meth:`capture` returned; touches no simulation.
+
+        Raises:
+            ValueError: A frame out of order. OSError: It could not be written; those before are
+                kept.
+        """
+        if frame is not None:
+            self._write(frame)
+
+    @abstractmethod
+    def _capture(self) -> Any:
+        """A frame that is to be recorded."""
+
+    @abstractmethod
+    def _write(self, frame: Any) -> None:
+        """Write it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +94,7 @@ class ParticleFrame:
     columns: dict[str, np.ndarray]
 
 
-class ParticleRecorder(ABC):
+class ParticleRecorder(Recorder):
     """A recorder of particles, without what is around them.
 
     Args:
@@ -93,12 +128,7 @@ class ParticleRecorder(ABC):
         overwrite: bool = False,
         resume: int | None = None,
     ):
-        self.owner = type(self).__name__
-        self.sim, self.path = sim, Path(path)
-        self.every = validate.whole(self.owner, "every", every, minimum=1)
-        validate.whole(self.owner, "frames", frames)
-        self.planned_last = (sim.frame + frames) // self.every
-        self.fields = ParticleFields(sim, fields)
+        super().__init__(sim, path, frames, fields, every)
         for name in self.fields.names:
             if name in COLUMNS or name == "time":
                 raise validate.fail(
@@ -113,18 +143,8 @@ class ParticleRecorder(ABC):
         if resume is not None:
             self._go_on(resume)
 
-    def write(self) -> None:
-        """Write the simulation's present state as its present frame, if that is to be recorded."""
-        self.write_frame(self.capture())
-
-    def capture(self) -> ParticleFrame | None:
-        """Copy to the host all that the present frame needs, and touch no file.
-
-        None: ``every`` leaves this frame out.
-        """
+    def _capture(self) -> ParticleFrame:
         sim = self.sim
-        if sim.frame % self.every:
-            return None
         radius = sim.get("radius") if "radius" in sim.state else sim.model.column("radius")
         x = sim.get("position")
         columns = {
@@ -136,15 +156,7 @@ class ParticleRecorder(ABC):
         }
         return ParticleFrame(sim.frame // self.every, sim.time, columns)
 
-    def write_frame(self, frame: ParticleFrame | None) -> None:
-        """Write what :meth:`capture` returned; touches no simulation.
-
-        Raises:
-            ValueError: A frame out of order. OSError: It could not be written; those before are
-                kept.
-        """
-        if frame is None:
-            return
+    def _write(self, frame: ParticleFrame) -> None:
         if self._closed or (self.last is not None and frame.number != self.last + 1):
             wanted = "come before close" if self._closed else "be the next"
             raise validate.fail(
@@ -163,17 +175,6 @@ class ParticleRecorder(ABC):
             self._finish()
         self._closed = True
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        try:
-            self.close()
-        except OSError:
-            if error is None:
-                raise
-            # The first error is the one to see.
-
     def identity(self) -> dict[str, Any]:
         """What must agree for a recording to be gone on with, as JSON."""
         sim = self.sim
@@ -187,9 +188,9 @@ class ParticleRecorder(ABC):
         }
 
     @property
-    def outputs(self) -> list[Path]:
-        """Files and folders that the recording is made of."""
-        return [self.path]
+    def beside(self) -> list[Path]:
+        """Further files and folders that the recording is made of."""
+        return []
 
     @abstractmethod
     def _begin(self, frame: ParticleFrame) -> None:
@@ -199,7 +200,7 @@ class ParticleRecorder(ABC):
     def _put(self, frame: ParticleFrame) -> None:
         """Write a frame."""
 
-    def _finish(self) -> None:  # noqa: B027  many formats need nothing
+    def _finish(self) -> None:
         """Write what has to come after the last frame."""
 
     @abstractmethod
@@ -207,22 +208,10 @@ class ParticleRecorder(ABC):
         """Take up an existing output, to replace what comes after frame ``last``."""
 
     def _refuse_unusable(self) -> None:
-        shown = str(self.path)
-        if self.path.suffix != self.suffix:
-            raise validate.fail(
-                self.owner, "path", f"end in {self.suffix}", shown, "choose another recorder"
-            )
-        if not self.path.parent.is_dir():
-            raise FileNotFoundError(
-                f"{self.owner}: path must be in an existing folder, got {shown!r}; "
-                f"make {str(self.path.parent)!r} first."
-            )
-        for existing in self.outputs:
-            if existing.exists() and not (self.overwrite or self.resumed):
-                raise FileExistsError(
-                    f"{self.owner}: path must be new, got {shown!r} where {existing.name!r} "
-                    "exists; choose another, or pass overwrite=True."
-                )
+        may_exist = self.overwrite or self.resumed
+        files.check_new(
+            self.owner, self.path, may_exist, suffixes=[self.suffix], beside=self.beside
+        )
 
     def _refuse_to_go_on(self, why: str) -> ValueError:
         return validate.fail(

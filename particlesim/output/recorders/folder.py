@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from .. import files
-from .base import ParticleFrame, ParticleRecorder
+from .base import KEPT, ParticleFrame, ParticleRecorder
 
-KEPT = "Frames written before are kept."
 FORMAT_VERSION = 1
 
 
@@ -29,8 +28,8 @@ class FolderRecorder(ParticleRecorder):
         return self.path.with_suffix(".frames")
 
     @property
-    def outputs(self) -> list[Path]:
-        return [self.path, self.folder]
+    def beside(self) -> list[Path]:
+        return [self.folder]
 
     def frame_path(self, number: int) -> Path:
         """The file of a frame."""

@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 
 from .. import files
-from .base import ParticleFrame
-from .folder import KEPT, FolderRecorder
+from .base import KEPT, ParticleFrame
+from .folder import FolderRecorder
 
 
 class NpzRecorder(FolderRecorder):
     """Records frames as NumPy archives, in the precision of the simulation, bit for bit.
 
     A frame ``out.frames/f.######.npz`` holds ``frame``, ``time`` and the columns of
-    :class:`~particlesim.output.recorders.base.ParticleFrame`. ``out.npz`` says what there is: ``first``
-    and ``last`` frame, ``dt`` between them, the names of ``groups`` and ``fields``, and the
-    ``pattern`` of the frames' paths, from the folder of ``out.npz``. Until the recording is closed
-    ``last`` is the planned one; frames are whole or not there.
+    :class:`.ParticleFrame`. ``out.npz`` says what there is: ``first`` and ``last`` frame, ``dt``
+    between them, the names of ``groups`` and ``fields``, and the ``pattern`` of the frames' paths,
+    from the folder of ``out.npz``. Until the recording is closed ``last`` is the planned one;
+    frames are whole or not there.
 
     Arguments are those of :class:`~particlesim.output.recorders.base.ParticleRecorder`.
 

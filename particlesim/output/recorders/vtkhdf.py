@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from ... import validate
 from .. import files
-from .base import ParticleFrame
-from .folder import KEPT, FolderRecorder
+from .base import KEPT, ParticleFrame
+from .folder import FolderRecorder
 
 VERSION = (2, 0)
 CELLS = ("Vertices", "Lines", "Polygons", "Strips")  # in the order of the specification
@@ -42,7 +43,7 @@ class VtkhdfRecorder(FolderRecorder):
     suffix = ".vtkhdf"
 
     def __init__(self, *arguments: Any, **options: Any):
-        self._library = _h5py()
+        self._library = validate.installed(self.__class__.__name__, "h5py", "vtkhdf")
         self._counts: list[int] = []
         self._times: list[float] = []
         self._kinds: dict[str, tuple[np.dtype, tuple[int, ...]]] = {}  # type, and shape of a row
@@ -180,14 +181,3 @@ class VtkhdfRecorder(FolderRecorder):
 def _kind(array: Any) -> tuple[np.dtype, tuple[int, ...]]:
     """Type, and shape of a row."""
     return array.dtype, tuple(array.shape[1:])
-
-
-def _h5py() -> Any:
-    try:
-        import h5py
-    except ImportError:
-        raise ImportError(
-            "VtkhdfRecorder: h5py must be installed, got no such package; "
-            "pip install 'particlesim[vtkhdf]'."
-        ) from None
-    return h5py

@@ -1,15 +1,5 @@
-"""USD frames for offline rendering: what of a simulation is drawn, and how it is written."""
+"""USD: recordings of simulations, and tools for what is in such files.
 
-from .info import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
-from .recorder import UsdRecorder
-from .writer import UsdWriter
-
-__all__ = [
-    "LinksPrim",
-    "MeshPrim",
-    "PointsPrim",
-    "Shape",
-    "StageInfo",
-    "UsdRecorder",
-    "UsdWriter",
-]
+``recorder`` and ``drawing`` say what of a simulation is shown, and ``writing`` puts it into files.
+``recording`` reads any USD file; ``info``, ``pack`` and ``checking`` are made of it.
+"""

@@ -14,7 +14,7 @@ from ...interactions.fluid.sph import SPH
 from ...scene.group import Group, select
 from ...scene.scene import Scene
 from ..surface.surface import Mesh, Surface
-from .info import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
+from .description import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
 from .placement import closed, offsets, periodic_box
 
 OWNER = "UsdRecorder"
@@ -156,8 +156,6 @@ class Drawing:
         yield from (fluid.prim for fluid in self.fluids)
 
     def _fluids(self, options: dict[str, Any]) -> Iterator[Fluid]:
-        from ..surface.surface import Surface
-
         parts = [part for part in self.sim.interactions if isinstance(part, SPH)]
         if not parts:
             raise validate.fail(

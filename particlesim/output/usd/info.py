@@ -1,274 +1,215 @@
-"""What a recording holds, described on the host: groups, links, meshes, boundaries, the stage.
-
-What a description leaves open as None (rows, pairs, triangles) comes with every frame, and may be
-more or less from one frame to the next.
-"""
+"""What is inside a USD file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import os
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
 
 import numpy as np
+from pxr import Usd, UsdGeom
 
-from ... import validate
-from .shapes import Color, Shape, named, replace
+from .recording import Recording, notes, prims, quiet, read
 
-__all__ = ["Color", "LinksPrim", "MeshPrim", "PointsPrim", "Shape", "StageInfo"]
+COUNTED = {  # which array says how many there are, and what they are called
+    "Points": ("points", "points"),
+    "PointInstancer": ("positions", "instances"),
+    "Mesh": ("faceVertexCounts", "faces"),
+    "BasisCurves": ("curveVertexCounts", "curves"),
+}
 
 
-@dataclass(frozen=True, eq=False)
-class PointsPrim:
-    """One group of one world, drawn as ``UsdGeomPoints``.
+@dataclass(frozen=True)
+class PrimInfo:
+    """One prim that is drawn, or several alike in different worlds.
 
-    Args:
-        world: Number of the world, from 0.
-        name: Name of the group; made a valid and unique prim name.
-        indices: Rows of the frame arrays, a slice with both ends or (n,) int; None: they and the
-            ids come with every frame.
-        ids: (n,) int, the same for one particle in every frame; None with the indices.
-        widths: Diameters, one for all or (n,) [length]. None: a hundredth of the diagonal of the
-            first frame, for particles without a size.
-        color: (r, g, b) in 0..1, linear.
-        instancer: Draw a ``UsdGeomPointInstancer`` of spheres instead.
+    ``path`` has ``####`` for the number of the world; ``count`` is the least and the largest
+    number over the frames and prims; ``size`` the bytes of values in a frame, the largest, summed
+    over the prims.
     """
 
-    world: int
-    name: str
-    indices: np.ndarray | slice | None
-    ids: np.ndarray | None
-    widths: np.ndarray | float | None
-    color: Color
-    instancer: bool = False
-
-    def __post_init__(self) -> None:
-        owner = "PointsPrim"
-        named(owner, self)
-        if self.indices is None:
-            if self.ids is not None or isinstance(self.widths, np.ndarray):
-                raise validate.fail(
-                    owner, "ids and widths", "be None and one number where indices are None",
-                    (self.ids, self.widths), "give ids with every frame, widths as a field",
-                )  # fmt: skip
-            count = 0
-        else:
-            replace(self, "indices", row_indices(owner, "indices", self.indices))
-            count = len(self.rows)
-            replace(self, "ids", particle_ids(owner, self.ids, count))
-        if self.widths is not None:
-            replace(self, "widths", _widths(owner, self.widths, count))
-
-    @property
-    def rows(self) -> np.ndarray:
-        """Rows of the frame arrays, in order, (n,) int; none where they come with the frames."""
-        if isinstance(self.indices, slice):
-            return np.arange(self.indices.start, self.indices.stop)
-        return np.zeros(0, dtype=np.int64) if self.indices is None else self.indices
+    path: str
+    type: str
+    prims: int
+    count: tuple[int, int]
+    unit: str
+    primvars: tuple[str, ...]
+    moving: bool
+    size: int
 
 
-@dataclass(frozen=True, eq=False)
-class LinksPrim:
-    """Pairs of particles of one world (ropes, springs, bonds), drawn as straight curves.
+@dataclass(frozen=True)
+class Info:
+    """What :func:`info` found; ``str`` shows it as a table."""
 
-    Args:
-        world: Number of the world, from 0.
-        name: Name of the links; made a valid and unique prim name.
-        pairs: (m, 2) int, rows of the frame arrays; None: they come with every frame.
-        width: Diameter of the curves [length].
-        color: (r, g, b) in 0..1, linear.
-    """
+    path: Path
+    prims: tuple[PrimInfo, ...]
+    frames: tuple[float, ...]
+    missing: int
+    start: float
+    end: float
+    fps: float
+    frame_time: float | None
+    up_axis: str
+    meters_per_unit: float
+    default_prim: str
+    files: int
+    size: int
 
-    world: int
-    name: str
-    pairs: np.ndarray | None
-    width: float
-    color: Color
+    def __str__(self) -> str:
+        return "\n".join([*self._heading(), "", *_table(self.prims)])
 
-    def __post_init__(self) -> None:
-        owner = "LinksPrim"
-        named(owner, self)
-        if self.pairs is not None:
-            replace(self, "pairs", row_pairs(owner, self.pairs))
-        replace(self, "width", validate.number(owner, "width", self.width, above=0, unit="length"))
+    def _heading(self) -> list[str]:
+        files = "1 file" if self.files == 1 else f"{self.files} files"
+        span = f"{len(self.frames)} frames"
+        if self.frames:
+            span += f", {self.frames[0]:g} to {self.frames[-1]:g}"
+        if self.missing:
+            span += f" ({self.missing} planned ones are not there)"
+        seconds = (self.end - self.start) / self.fps if self.fps > 0 else 0.0
+        time = f"{self.fps:g} a second, {seconds:g} s of playback"
+        if self.frame_time:
+            time += f", {self.frame_time * (self.end - self.start):g} s simulated"
+        return [
+            f"{self.path}: {_bytes(self.size)} in {files}",
+            f"frames     {span}; {time}",
+            f"stage      {self.default_prim or 'no default prim'}, {self.up_axis} up, "
+            f"{self.meters_per_unit:g} m a unit",
+        ]
 
 
-@dataclass(frozen=True, eq=False)
-class MeshPrim:
-    """A surface of one world, drawn as ``UsdGeomMesh`` of triangles with vertex normals.
+def info(path: str | os.PathLike[str]) -> Info:
+    """Look into a USD file.
 
     Args:
-        world: Number of the world, from 0.
-        name: Name of the surface; made a valid and unique prim name.
-        color: (r, g, b) in 0..1, linear.
-        indices: Rows of the frame arrays, a slice with both ends or (n,) int, for a surface that
-            is spanned by particles. Then normals are the area-weighted means of the triangles.
-        triangles: (t, 3) int into the surface's own points, counterclockwise from outside. None,
-            with the indices: points, triangles and normals come with every frame.
-    """
-
-    world: int
-    name: str
-    color: Color
-    indices: np.ndarray | slice | None = None
-    triangles: np.ndarray | None = None
-
-    def __post_init__(self) -> None:
-        owner = "MeshPrim"
-        named(owner, self)
-        if (self.indices is None) != (self.triangles is None):
-            raise validate.fail(
-                owner, "triangles", "be given with indices, or neither", self.triangles,
-                "give both, or all with every frame",
-            )  # fmt: skip
-        if self.indices is not None:
-            replace(self, "indices", row_indices(owner, "indices", self.indices))
-            checked = validate.triangles(owner, self.triangles, len(self.rows), proper=False)
-            replace(self, "triangles", checked)
-
-    @property
-    def rows(self) -> np.ndarray:
-        """Rows of the frame arrays, in order, (n,) int; none where points come with the frames."""
-        if isinstance(self.indices, slice):
-            return np.arange(self.indices.start, self.indices.stop)
-        return np.zeros(0, dtype=np.int64) if self.indices is None else self.indices
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class StageInfo:
-    """What a recording holds besides the frames.
-
-    Args:
-        points: The groups.
-        links: Pairs to draw.
-        meshes: Surfaces to draw; there is at least one group or one surface.
-        shapes: Boundaries to draw.
-        layout: Where a world is put, by its number, (3,) [length]: the transform of its
-            ``/World/env_####``, which no points know of. Worlds that are left out stay.
-        frames: How many frames are planned, the start state included. More or fewer may come.
-        fps: Frames a second of playback [1/s].
-        frame_time: Simulated time between two frames [time]. Authored velocities are scaled by
-            ``frame_time * fps``, so that ``points + velocities / fps`` is about the next frame.
-            None: ``1 / fps``, playback in real time.
-        up_axis: ``"y"`` or ``"z"``.
-        meters_per_unit: Length of one unit [m].
-        periodic: ``(lower, upper)`` corners of a periodic box [length], drawn as an outline; links
-            then take the short way. None or NaN on an axis leaves it open.
+        path: The file: a recording, or any other.
 
     Raises:
-        ValueError: A value out of range, ``up_axis="x"`` (USD knows Y and Z only), nothing to draw.
+        FileNotFoundError: There is no such file. ValueError: It cannot be read as USD.
+
+    Example:
+        >>> from particlesim import Scene, Simulation
+        >>> scene = Scene()
+        >>> ball = scene.add_particles([(0, 1, 0)], velocity=(1, 0, 0), radius=0.1)
+        >>> Simulation(scene, device="cpu").run(2, record="ball.usda")
+        >>> found = info("ball.usda")
+        >>> len(found.frames), [prim.count for prim in found.prims if prim.type == "Points"]
+        (3, [(1, 1)])
     """
-
-    points: Sequence[PointsPrim] = ()
-    links: Sequence[LinksPrim] = ()
-    meshes: Sequence[MeshPrim] = ()
-    shapes: Sequence[Shape] = ()
-    layout: Mapping[int, Any] | None = None
-    frames: int = 1
-    fps: float = 60.0
-    frame_time: float | None = None
-    up_axis: str = "y"
-    meters_per_unit: float = 1.0
-    periodic: Any = None
-
-    def __post_init__(self) -> None:
-        owner = "StageInfo"
-        if self.up_axis not in ("y", "z"):
-            raise validate.fail(
-                owner, "up_axis", "be 'y' or 'z' in USD", self.up_axis, "turn the scene"
-            )
-        validate.number(owner, "meters_per_unit", self.meters_per_unit, above=0, unit="m")
-        validate.number(owner, "fps", self.fps, above=0, unit="1/s")
-        validate.whole(owner, "frames", self.frames, minimum=1)
-        if self.frame_time is not None:
-            validate.number(owner, "frame_time", self.frame_time, above=0, unit="time")
-        if not self.points and not self.meshes:
-            raise validate.fail(
-                owner, "points", "hold a group, or meshes a surface", self.points, "give one"
-            )
-        offsets = {
-            validate.whole(owner, "layout", world): validate.vector(owner, "layout", offset)
-            for world, offset in (self.layout or {}).items()
-        }
-        replace(self, "layout", offsets)
-        if self.periodic is not None:
-            replace(self, "periodic", _corners(owner, self.periodic))
-
-    @property
-    def velocity_scale(self) -> float:
-        """Simulated time a second of playback: velocities are authored per second of playback."""
-        return 1.0 if self.frame_time is None else self.frame_time * self.fps
-
-    def offset(self, world: int) -> np.ndarray:
-        """Where a world is put, (3,) [length]."""
-        return (self.layout or {}).get(world, np.zeros(3))
-
-    @property
-    def worlds(self) -> list[int]:
-        """The worlds that something is drawn of."""
-        parts: list[Any] = [*self.points, *self.links, *self.meshes, *self.shapes]
-        return sorted({part.world for part in parts})
-
-
-def row_indices(owner: str, name: str, given: Any, *, empty: bool = False) -> Any:
-    """A slice with both ends, or whole numbers from 0; at least one row unless ``empty``."""
-    if isinstance(given, slice):
-        ends = (given.start, given.stop)
-        if None in ends or given.step not in (None, 1) or not 0 <= ends[0] < ends[1]:
-            raise validate.fail(owner, name, "have both ends and a row", given, "give slice(a, b)")
-        return given
-    array = np.asarray(given)
-    if empty and array.size == 0:
-        return np.zeros(0, dtype=np.int64)
-    if array.ndim != 1 or not len(array) or not np.issubdtype(array.dtype, np.integer):
-        raise validate.fail(owner, name, "be at least one row", given, "give whole numbers")
-    if array.min() < 0:
-        raise validate.fail(owner, name, "be at least 0", int(array.min()), "count from 0")
-    return array.astype(np.int64)
-
-
-def row_pairs(owner: str, given: Any, *, empty: bool = False) -> np.ndarray:
-    """Pairs of rows, (m, 2) int64; at least one unless ``empty``."""
-    pairs = np.asarray(given)
-    if empty and pairs.size == 0:
-        return np.zeros((0, 2), dtype=np.int64)
-    if pairs.ndim != 2 or pairs.shape[1] != 2:
-        raise validate.fail(owner, "pairs", "have shape (m, 2)", pairs.shape, "give two a link")
-    return row_indices(owner, "pairs", pairs.ravel()).reshape(-1, 2)
-
-
-def particle_ids(owner: str, given: Any, count: int) -> np.ndarray:
-    """Numbers of particles, (count,) int64, that fit into 32 bits."""
-    ids = np.asarray(given)
-    if count == 0 and ids.size == 0:
-        return np.zeros(0, dtype=np.int64)
-    if ids.shape != (count,) or not np.issubdtype(ids.dtype, np.integer):
-        raise validate.fail(owner, "ids", f"be {count} whole numbers", ids, "give one a row")
-    if ids.min() < 0 or ids.max() > np.iinfo(np.int32).max:
-        raise validate.fail(owner, "ids", "be in 0..2^31 - 1", ids, "count from 0")
-    # Most are in order, and need no sorting to be told apart.
-    if not (np.diff(ids) > 0).all() and len(np.unique(ids)) < count:
-        raise validate.fail(owner, "ids", "be different", ids, "give every particle its own")
-    return ids.astype(np.int64)
-
-
-def _widths(owner: str, given: Any, count: int) -> np.ndarray | float:
-    """One diameter, or (n,) float32."""
-    if np.ndim(given) == 0:
-        return validate.number(owner, "widths", given, minimum=0, unit="length")
-    array = validate.rows(owner, "widths", given, count, None)
-    if array.min() < 0:
-        raise validate.fail(
-            owner, "widths", "be at least 0 [length]", array.min(), "give diameters"
+    with quiet():
+        recording = Recording("usd.info", path)
+        frames, stage = recording.frames(), recording.stage
+        files = _files(recording)
+        planned = {clip.frame for clip in recording.clips}
+        return Info(
+            path=recording.path,
+            prims=tuple(_prims(recording, frames)),
+            frames=tuple(frames),
+            missing=len(planned - set(frames)),
+            start=stage.GetStartTimeCode(),
+            end=stage.GetEndTimeCode(),
+            fps=stage.GetTimeCodesPerSecond(),
+            frame_time=notes(stage).get("frameTime"),
+            up_axis=str(UsdGeom.GetStageUpAxis(stage)),
+            meters_per_unit=UsdGeom.GetStageMetersPerUnit(stage),
+            default_prim=str(stage.GetDefaultPrim().GetPath()) if stage.GetDefaultPrim() else "",
+            files=len(files),
+            size=sum(file.stat().st_size for file in files),
         )
-    return array.astype(np.float32)
 
 
-def _corners(owner: str, given: Any) -> np.ndarray:
-    """Lower and upper corner, (2, 3), NaN on open axes."""
-    corners = np.array(given, dtype=np.float64)
-    if corners.shape != (2, 3):
-        raise validate.fail(owner, "periodic", "be (lower, upper), three each", given, "give both")
-    if np.any(corners[1] <= corners[0]):
-        raise validate.fail(owner, "periodic", "have upper above lower", given, "swap them")
-    return np.where(np.isfinite(corners).all(axis=0), corners, np.nan)
+def _files(recording: Recording) -> set[Path]:
+    """The files that it consists of and that are there."""
+    found = {Path(layer.realPath) for layer in recording.stage.GetUsedLayers() if layer.realPath}
+    found |= {clip.path for clip in recording.clips}
+    found |= {each.manifest for each in recording.clip_sets if each.manifest}
+    return {file.resolve() for file in found if file.is_file()}
+
+
+def _prims(recording: Recording, frames: Sequence[float]) -> list[PrimInfo]:
+    """Everything that is drawn, worlds put together."""
+    counts: dict[str, list[int]] = {}
+    sizes: dict[str, int] = {}
+    first: dict[str, tuple[str, str, tuple[str, ...], bool]] = {}
+
+    def look(stage: Usd.Stage, some: list[float]) -> list[None]:
+        for prim in prims(stage):
+            drawn = prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.PointInstancer)
+            if not drawn:
+                continue
+            path, kind = str(prim.GetPath()), str(prim.GetTypeName())
+            array, unit = COUNTED.get(kind, ("", ""))
+            attributes = [each for each in prim.GetAuthoredAttributes() if each.HasValue()]
+            moving = any(each.ValueMightBeTimeVarying() for each in attributes)
+            if path not in first:
+                first[path] = (kind, unit, _primvars(prim), moving)
+                counts[path], sizes[path] = [], 0
+            elif not moving:
+                continue
+            for frame in some if moving else some[:1]:
+                values = {each.GetName(): read(each, frame) for each in attributes}
+                held = [v for v in values.values() if isinstance(v, np.ndarray)]
+                sizes[path] = max(sizes[path], sum(v.nbytes for v in held))
+                if values.get(array) is not None:
+                    counts[path].append(len(values[array]))
+        return []
+
+    recording.visit(frames or [0.0], look)
+    return _grouped(first, counts, sizes)
+
+
+def _grouped(
+    first: dict[str, tuple[str, str, tuple[str, ...], bool]],
+    counts: dict[str, list[int]],
+    sizes: dict[str, int],
+) -> list[PrimInfo]:
+    """Prims that are alike but for their world become one."""
+    groups: dict[tuple, list[str]] = {}
+    for path, kind in first.items():
+        pattern = re.sub(r"/env_\d+", "/env_####", path)
+        groups.setdefault((pattern, *kind), []).append(path)
+    result = []
+    for (pattern, kind, unit, primvars, moving), paths in groups.items():
+        every = [count for path in paths for count in counts[path]] or [1]
+        result.append(
+            PrimInfo(
+                pattern if len(paths) > 1 else paths[0], kind, len(paths),
+                (min(every), max(every)), unit, primvars, moving,
+                sum(sizes[path] for path in paths),
+            )
+        )  # fmt: skip
+    return result
+
+
+def _primvars(prim: Usd.Prim) -> tuple[str, ...]:
+    found = UsdGeom.PrimvarsAPI(prim).GetPrimvars()
+    return tuple(each.GetPrimvarName() for each in found if each.GetAttr().IsAuthored())
+
+
+def _table(rows: Sequence[PrimInfo]) -> list[str]:
+    """One line a row, in columns."""
+    lines = [("prim", "type", "", "moves", "a frame", "primvars")]
+    for row in rows:
+        low, high = row.count
+        count = (f"{low}" if low == high else f"{low}..{high}") + f" {row.unit}" if row.unit else ""
+        times = f"{row.prims} x " if row.prims > 1 else ""
+        lines.append(
+            (row.path, row.type, times + count, "yes" if row.moving else "no", _bytes(row.size),
+             ", ".join(row.primvars))
+        )  # fmt: skip
+    widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
+        for line in lines
+    ]
+
+
+def _bytes(size: float) -> str:
+    """A number of bytes with a prefix."""
+    for prefix in ("", "Ki", "Mi"):
+        if size < 1000:
+            return f"{size:.3g} {prefix}B"
+        size /= 1024
+    return f"{size:.3g} GiB"

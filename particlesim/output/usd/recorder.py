@@ -5,22 +5,22 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
-from ... import validate
 from ...engine.source import Source
+from ..fields import ParticleColors
+from ..recorders.base import Recorder
 from .drawing import Drawing
-from .fields import ParticleColors, ParticleFields
-from .writer import UsdWriter
+from .writing.writer import UsdWriter
 
 
 @dataclass(frozen=True, eq=False)
 class FrameData:
-    """All that is written of one frame, on the host (see :meth:`UsdRecorder.capture`).
+    """All that is written of one frame, on the host (see :meth:`Recorder.capture`).
 
-    ``changing`` are the further arguments of :meth:`particlesim.output.usd.UsdWriter.write`.
+    ``changing`` are the further arguments of :meth:`.UsdWriter.write`.
     """
 
     number: int
@@ -30,7 +30,7 @@ class FrameData:
     changing: dict[str, Any] = field(default_factory=dict)
 
 
-class UsdRecorder:
+class UsdRecorder(Recorder):
     """Records the frames of a simulation into a USD file, each safe as soon as it is written.
 
     Groups are drawn as points; those that were given triangles as meshes with normals. Pairs of
@@ -66,8 +66,8 @@ class UsdRecorder:
         resume: Go on after the recorded frame of this number; those after it are replaced.
 
     Raises:
-        FileExistsError, FileNotFoundError, ValueError: As :class:`~particlesim.output.usd.UsdWriter`, and
-            names of worlds, groups, fields and colour maps that are not there.
+        FileExistsError, FileNotFoundError, ValueError: As :class:`.UsdWriter`, and names of
+            worlds, groups, fields and colour maps that are not there.
 
     Example:
         >>> from particlesim import Scene, Simulation
@@ -100,16 +100,13 @@ class UsdRecorder:
         surface: bool | Mapping[str, Any] = False,
         resume: int | None = None,
     ):
-        self.sim = sim
-        self.every = validate.whole("UsdRecorder", "every", every, minimum=1)
-        validate.whole("UsdRecorder", "frames", frames)
+        super().__init__(sim, path, frames, fields, every)
         first, last = -(-sim.frame // self.every), (sim.frame + frames) // self.every
         self.drawing = Drawing(
             sim, frames=max(1, last - first + 1), frame_time=self.every * sim.settings.dt, fps=fps,
             worlds=worlds, groups=groups, layout=layout, instancer=instancer,
             surface=surface,
         )  # fmt: skip
-        self.fields = ParticleFields(sim, fields)
         kinds = {name: self.fields.kind(name) for name in self.fields.names}
         self.colors: ParticleColors | None = None
         if color_by is not None:
@@ -117,50 +114,30 @@ class UsdRecorder:
             self.colors = ParticleColors(sim, color_by, color_map, color_range, rows)
             kinds["displayColor"] = "color"
         self.writer = UsdWriter(
-            path, self.drawing.info, fields=kinds, overwrite=overwrite, resume=resume
+            self.path, self.drawing.info, fields=kinds, overwrite=overwrite, resume=resume
         )
         if self.colors is not None:
             self.colors.restore(self.writer.notes)
 
-    def write(self) -> None:
-        """Write the simulation's present state as its present frame, if that is to be recorded."""
-        self.write_frame(self.capture())
-
-    def capture(self) -> FrameData | None:
-        """Copy to the host all that the present frame needs, and touch no file.
-
-        What it returns shares nothing with the simulation: another thread may write it while the
-        simulation goes on. None: ``every`` leaves this frame out.
-        """
-        sim = self.sim
-        if sim.frame % self.every:
-            return None
+    def _capture(self) -> FrameData:
         fields = self.fields.read()
-        drawing = self.drawing
         changing: dict[str, Any] = {
-            "pairs": drawing.pairs(),
-            "meshes": drawing.meshes(),
-            "poses": drawing.poses(),
+            "pairs": self.drawing.pairs(),
+            "meshes": self.drawing.meshes(),
+            "poses": self.drawing.poses(),
         }
         if self.colors is not None:
             fields["displayColor"] = self.colors.read()
             changing["notes"] = self.colors.notes()
+        sim = self.sim
         number = sim.frame // self.every
         return FrameData(number, sim.get("position"), sim.get("velocity"), fields, changing)
 
-    def write_frame(self, frame: FrameData | None) -> None:
-        """Write what :meth:`capture` returned; touches no simulation."""
-        if frame is not None:
-            self.writer.write(
-                frame.number, frame.position, frame.velocity, frame.fields, **frame.changing
-            )
+    def _write(self, frame: FrameData) -> None:
+        self.writer.write(
+            frame.number, frame.position, frame.velocity, frame.fields, **frame.changing
+        )
 
     def close(self) -> None:
         """Give the file the end that was reached."""
         self.writer.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self.writer.__exit__(*error)

@@ -11,6 +11,7 @@ from pxr import Usd, UsdGeom
 
 from ... import validate
 from ...output import colors
+from ...output.usd.recording import notes, prims
 
 PLAIN = (0.6, 0.6, 0.6)  # of what has no colour
 QUANTILES = (0.01, 0.99)  # that a colour map spans: single particles fly off
@@ -75,7 +76,7 @@ def field(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> np.ndarray | None:
 def field_names(stage: Usd.Stage) -> list[str]:
     """Names of the values that points of a stage have."""
     names = {"speed"}
-    for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()):
+    for prim in prims(stage):
         if prim.IsA(UsdGeom.Boundable):
             for primvar in UsdGeom.PrimvarsAPI(prim).GetPrimvars():
                 if primvar.GetInterpolation() in ("vertex", "varying"):
@@ -105,7 +106,7 @@ def scanned(frames: Sequence[float]) -> list[float]:
 
 def _values(stage: Usd.Stage, name: str, frames: Iterable[float]) -> Iterable[np.ndarray]:
     for frame in frames:
-        for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()):
+        for prim in prims(stage):
             if prim.IsA(UsdGeom.Boundable):
                 values = field(prim, name, Usd.TimeCode(frame))
                 if values is not None:
@@ -114,6 +115,5 @@ def _values(stage: Usd.Stage, name: str, frames: Iterable[float]) -> Iterable[np
 
 def velocity_scale(stage: Usd.Stage) -> float:
     """Simulated time a second of playback, which authored velocities are scaled by."""
-    own = stage.GetRootLayer().customLayerData.get("particlesim", {})
-    frame_time = own.get("frameTime") if isinstance(own, dict) else None
+    frame_time = notes(stage).get("frameTime")
     return frame_time * stage.GetTimeCodesPerSecond() if frame_time else 1.0

@@ -86,7 +86,7 @@ def seen(sim: Source, **recorded: Any) -> View:
         **recorded: Options of :class:`~particlesim.output.usd.recorder.UsdRecorder`.
     """
     from ...output.usd.recorder import UsdRecorder
-    from ...output.usd_tools.recording import Recording
+    from ...output.usd.recording import Recording
     from .stage import View, look_at
 
     if not sim.model.particle_count:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from pxr import Usd, UsdGeom
 
-from ...output.usd.geometry import CORNERS, FACES
+from ...output.usd.layout import is_outline
+from ...output.usd.writing.geometry import CORNERS, FACES, posed
 from .geometry import Geometry
 from .paint import Paint, authored
 
@@ -54,7 +55,7 @@ class PrimReader:
         if width is None:
             width = THIN * (float(np.linalg.norm(np.ptp(x, axis=0))) or 1.0)
         color = self.paint.of(prim, self.time, len(x))
-        self.geometry.add_spheres(moved(x, pose), 0.5 * width * scale(pose), one(color))
+        self.geometry.add_spheres(posed(x, pose), 0.5 * width * scale(pose), one(color))
 
     def curves(self, prim: Usd.Prim, pose: np.ndarray) -> None:
         """Curves through their points by straight pieces; other bases by their control polygon."""
@@ -70,7 +71,7 @@ class PrimReader:
         color = self.paint.of(prim, self.time, len(x))
         if len(color) == len(x) > 1:
             color = np.stack([color[start], color[end]], axis=1)
-        at = moved(x, pose)
+        at = posed(x, pose)
         radii = np.stack([radius[start], radius[end]], axis=1)
         self.geometry.add_cones(at[start], at[end], radii, one(color), not is_outline(prim))
 
@@ -144,7 +145,7 @@ class PrimReader:
     def sphere(self, prim: Usd.Prim, pose: np.ndarray) -> None:
         radius = float(self.get(prim, "radius")) * scale(pose)
         color = one(self.paint.of(prim, self.time, 1))
-        self.geometry.add_spheres(moved(np.zeros((1, 3)), pose), radius, color)
+        self.geometry.add_spheres(posed(np.zeros((1, 3)), pose), radius, color)
 
     def cube(self, prim: Usd.Prim, pose: np.ndarray) -> None:
         x = (CORNERS - 0.5) * float(self.get(prim, "size"))
@@ -164,7 +165,7 @@ class PrimReader:
         half[0, AXES[self.get(prim, "axis", "Z")]] = 0.5 * float(self.get(prim, "height"))
         radius = float(self.get(prim, "radius")) * scale(pose)
         color = one(self.paint.of(prim, self.time, 1))
-        self.geometry.add_cones(moved(-half, pose), moved(half, pose), radius, color)
+        self.geometry.add_cones(posed(-half, pose), posed(half, pose), radius, color)
 
     def _triangles(
         self,
@@ -184,7 +185,7 @@ class PrimReader:
         solid = float(np.mean(given)) if given is not None and len(given) else 1.0
         if solid < 1.0 and color.ndim == 3:
             color = color.mean(axis=1)
-        self.geometry.add_triangles(moved(x, pose), index, color, normals, solid)
+        self.geometry.add_triangles(posed(x, pose), index, color, normals, solid)
 
     def _normals(self, prim: Usd.Prim, corners: np.ndarray, fan: np.ndarray) -> np.ndarray | None:
         """Authored normals at the triangles' corners, (t, 3, 3); None: flat faces."""
@@ -216,23 +217,6 @@ READERS: list[tuple[Any, Callable[[PrimReader, Usd.Prim, np.ndarray], None]]] = 
     (UsdGeom.Plane, PrimReader.plane),
     (UsdGeom.Capsule, PrimReader.capsule),
 ]
-
-
-def is_outline(prim: Usd.Prim) -> bool:
-    """Whether curves show where a boundary or a periodic box is."""
-    return prim.GetName() == "periodic_box" or is_boundary(prim)
-
-
-def is_boundary(prim: Usd.Prim) -> bool:
-    """Whether a prim is what a recording draws of a boundary."""
-    return "/boundaries/" in str(prim.GetPath())
-
-
-def moved(points: np.ndarray, pose: np.ndarray) -> np.ndarray:
-    """Points (n, 3) in rows times a pose (4, 4)."""
-    if np.array_equal(pose, np.eye(4)):
-        return points
-    return points @ pose[:3, :3] + pose[3, :3]
 
 
 def scale(pose: np.ndarray) -> float:

@@ -8,10 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Usd, UsdGeom
 
+from ...output.usd.layout import is_boundary
+from ...output.usd.recording import prims, up_axis
+from ...output.usd.writing.geometry import posed
 from .camera import Camera
 from .geometry import Geometry
 from .paint import Paint
-from .prims import PrimReader, is_boundary, moved
+from .prims import PrimReader
 
 SUNK = 1e-3  # of what there is to see, that a ground is below clear floors
 LEVEL = 1e-6  # off which a plane is not level
@@ -48,10 +51,10 @@ def look_at(stage: Usd.Stage, frame: float, paint: Paint | None = None) -> View:
     geometry = Geometry()
     reader = PrimReader(geometry, paint or Paint(), time)
     cache = UsdGeom.XformCache(time)
-    up = np.eye(3)[2 if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else 1]
+    up = up_axis(stage)
     heights: list[float] = []
     camera = None
-    scanned = iter(Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()))
+    scanned = prims(stage)
     for prim in scanned:
         image = UsdGeom.Imageable(prim)
         if image and _hidden(image, time):
@@ -84,7 +87,7 @@ def _is_ground(
     x = reader.array(prim, "points")
     if x is None:
         return False
-    height = moved(x.astype(np.float64), pose) @ up
+    height = posed(x.astype(np.float64), pose) @ up
     heights.append(float(height.min()))
     opacity = reader.array(prim, "primvars:displayOpacity")
     solid = opacity is None or opacity.min() >= 1.0

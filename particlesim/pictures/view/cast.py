@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom
 
+from ...output.usd.layout import is_boundary
 from ..render.paint import Paint
-from ..render.prims import READERS, is_boundary
+from ..render.prims import READERS
 
 WORLD = re.compile(r"/env_(\d+)/([^/]+)")
 FIXED = (Usd.ResolveInfoSourceNone, Usd.ResolveInfoSourceFallback, Usd.ResolveInfoSourceDefault)

@@ -13,8 +13,7 @@ from pxr import UsdGeom
 
 from ... import validate
 from ...output import colors
-from ...output.usd_tools.clips import opened
-from ...output.usd_tools.recording import PORTION, Recording, quiet
+from ...output.usd.recording import PORTION, Recording, quiet
 from ..render.camera import Camera
 from ..render.paint import Paint, field_names, scanned, spanned
 from ..render.stage import look_at
@@ -203,12 +202,7 @@ class Footage:
 
     def _damaged(self, frame: float) -> Path | None:
         """A file of a frame that cannot be read, as one that was cut off."""
-        for clip_set in self._fresh().clip_sets:
-            for clip in clip_set.clips:
-                seen = clip.frame <= frame < clip.until and clip.path.is_file()
-                if seen and opened(clip.path) is None:
-                    return clip.path
-        return None
+        return self._fresh().damaged(frame)
 
     @property
     def _first(self) -> float:

@@ -10,7 +10,7 @@ from typing import Any
 
 from ...engine.source import Runner
 from ...output.usd.recorder import UsdRecorder
-from ...output.usd.writer import UsdWriter
+from ...output.usd.writing.writer import UsdWriter
 from .footage import Footage
 
 

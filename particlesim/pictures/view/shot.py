@@ -7,9 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 from pxr import Usd, UsdGeom
 
+from ...output.usd.writing.geometry import posed
 from ..render.geometry import Geometry
 from ..render.paint import Paint
-from ..render.prims import PrimReader, moved
+from ..render.prims import PrimReader
 from .cast import Member
 
 LAYERS = ("thing", "boundary", "plane")
@@ -78,4 +79,4 @@ def _edges(prim: Usd.Prim, pose: np.ndarray, time: Usd.TimeCode) -> np.ndarray:
     following = np.arange(1, len(corners) + 1)
     following[ends[counts > 0] - 1] = (ends - counts)[counts > 0]
     pairs = np.sort(np.stack([corners, corners[following]], axis=1), axis=1)
-    return moved(x, pose)[np.unique(pairs, axis=0)]
+    return posed(x, pose)[np.unique(pairs, axis=0)]

@@ -1,0 +1,1 @@
+"""Writing USD frames: the root layer, and value clips with what changes."""
