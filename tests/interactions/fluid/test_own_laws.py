@@ -129,3 +129,12 @@ def test_shear_decays_by_the_viscosity():
         sim.step()
     found = -np.polyfit(0.05 / rate * np.arange(4, 17), np.log(signal[4:]), 1)[0]
     assert found == pytest.approx(rate, rel=0.1)
+
+
+def test_a_law_that_is_missing(refused):
+    class Half(ps.EquationOfState):
+        pressure = isothermal_pressure
+        parameters = {"sound_speed": 1.0}  # noqa: RUF012
+
+    with refused("Half: laws must be pressure, energy, sound_speed, got no energy", TypeError):
+        ps.SPH(smoothing_length=0.1, equation_of_state=Half())
