@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import ast
 import functools
-import hashlib
 import inspect
-import linecache
 import math
 import re
 import textwrap
@@ -21,9 +19,9 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from warp._src.codegen import Struct
 
 from .extremes import larger, smaller, within
+from .warp_internals import compiled, digest, is_after_gradients, named_function
 
 # Generic names that a law may use, and what they become in float64.
 _DOUBLE = {
@@ -33,6 +31,10 @@ _DOUBLE = {
 _DOUBLE["float32"] = wp.float64
 # What laws call in place of Warp's own, so that their derivatives vectorise.
 _EXTREMES = {"max": larger, "min": smaller, "clamp": within}
+
+
+# Coincident particles part along this direction, or with its components' signs turned.
+APART = (0.48, 0.6, 0.64)
 
 
 @dataclass(frozen=True)
@@ -161,38 +163,10 @@ def translate(
         name: annotation(parameter.annotation, precision)
         for name, parameter in inspect.signature(func, eval_str=True).parameters.items()
     }
-    digest = _digest(source, precision.name, *hints.values(), *used.values())
-    return _made_once(
-        copy,
-        f"law_{func.__name__}_{digest}",
-        # A law that calls what is derived inside comes behind the adjoints too.
-        "grad" in func.__code__.co_names
-        or any(isinstance(v, wp.Function) and v.adj.uses_grad_call for v in used.values()),
-        module=wp.get_module(func.__module__),
-        overloaded_annotations=hints,
-        source=source,
-    )
-
-
-_FUNCTIONS: dict[tuple[Any, ...], wp.Function] = {}
-
-
-def _made_once(
-    func: Callable[..., Any], native_func: str, after_gradients: bool = False, **options: Any
-) -> wp.Function:
-    """The Warp function of that native name, the same one for the same name.
-
-    A kernel that calls what is one function by content gets its definition once, also where two
-    users made it, each for themselves.
-    """
-    key = (native_func, func.__module__, after_gradients)
-    if key not in _FUNCTIONS:
-        made = wp.Function(
-            func, key=func.__name__, namespace="", native_func=native_func, **options
-        )
-        made.adj.uses_grad_call = after_gradients
-        _FUNCTIONS[key] = made
-    return _FUNCTIONS[key]
+    name = f"law_{func.__name__}_{digest(source, precision.name, *hints.values(), *used.values())}"
+    # A law that calls what is derived inside comes behind the adjoints too.
+    derives = "grad" in func.__code__.co_names or any(map(is_after_gradients, used.values()))
+    return named_function(copy, name, annotations=hints, source=source, after_gradients=derives)
 
 
 def _rewritten(func: Callable[..., Any], precision: Precision, scope: dict[str, Any]) -> str:
@@ -204,61 +178,36 @@ def _rewritten(func: Callable[..., Any], precision: Precision, scope: dict[str, 
     return ast.unparse(_Rewriter(precision, scope).visit(tree))
 
 
-def _digest(*parts: Any) -> str:
-    """Hash of values by what they are, the same in every process."""
-
-    def text(value: Any) -> str:
-        if isinstance(value, wp.Function):
-            return value.native_func
-        if isinstance(value, Struct):
-            return value.key + value.hash.hex()
-        if isinstance(value, wp.array):
-            return f"array{value.ndim} of {text(value.dtype)}"
-        if hasattr(value, "_wp_scalar_type_") and isinstance(value, type):
-            # Vector types of any length and precision share one Python name.
-            kind = (value._wp_generic_type_str_, value._wp_scalar_type_, value._shape_)
-            return f"{kind[0]} of {kind[1].__name__} {kind[2]}"
-        return str(getattr(value, "__qualname__", value))
-
-    return hashlib.sha256("|".join(map(text, parts)).encode()).hexdigest()[:12]
-
-
 def function(func: Callable[..., Any], after_gradients: bool = False) -> wp.Function:
     """Register ``func``, annotated with Warp types, under a native name that repeats in every run.
 
-    ``wp.func`` numbers its native names by the order of creation; functions that native snippets
-    call by name would then miss the kernel cache whenever that order changes. The name hashes
-    the source and the closure, by the native names of the functions in it.
-
-    ``after_gradients`` has Warp emit it together with the functions that use ``wp.grad``, which
-    it may then call.
+    The name hashes the source and the closure, by the native names of the functions in it.
+    ``after_gradients`` is for functions that call what uses ``wp.grad``, see ``named_function``.
     """
     cells = [c.cell_contents for c in func.__closure__ or ()]
-    digest = _digest(inspect.getsource(func), *cells, *func.__annotations__.values())
-    return _made_once(
-        func,
-        f"{func.__name__}_{digest}",
-        after_gradients,
-        module=wp.get_module(func.__module__),
-    )
+    content = digest(inspect.getsource(func), *cells, *func.__annotations__.values())
+    name = f"{func.__name__}_{content}"
+    return named_function(func, name, after_gradients=after_gradients)
 
 
 def native(stub: Callable[..., Any], snippet: str, after_gradients: bool = True) -> wp.Function:
     """A function whose body is C++, named after its content like :func:`function`.
 
-    ``after_gradients`` has Warp emit it together with the functions that use ``wp.grad``, behind
-    the adjoints that those call, so that the snippet may call a derived law by name.
+    The stub calls the functions that the snippet calls by name: Warp then emits them before it.
+    With ``after_gradients`` they may be derived laws.
     """
-    digest = _digest(snippet, *stub.__annotations__.values())
-    return _made_once(
-        stub,
-        f"{stub.__name__}_{digest}",
-        after_gradients,
-        module=wp.get_module(stub.__module__),
-        native_snippet=snippet,
-        # Warp honours the return type only where it reads its own decorator in the source.
-        source="@wp.func_native()\n" + textwrap.dedent(inspect.getsource(stub)),
-    )
+    name = f"{stub.__name__}_{digest(snippet, *stub.__annotations__.values())}"
+    return named_function(stub, name, snippet=snippet, after_gradients=after_gradients)
+
+
+def function_from_source(
+    source: str, namespace: dict[str, Any], after_gradients: bool = False
+) -> wp.Function:
+    """Make a Warp function of generated source; ``namespace`` holds the names it refers to."""
+    name = re.search(r"def (\w+)\(", source).group(1)
+    content = digest(source, *namespace.keys(), *namespace.values())
+    func = compiled(source, name, {**namespace, "__name__": __name__})
+    return named_function(func, f"{name}_{content}", after_gradients=after_gradients)
 
 
 KERNELS: list[wp.Kernel] = []  # every kernel built in this process that CUDA can run
@@ -277,21 +226,13 @@ def register(func: Callable[..., Any], cpu_only: bool = False) -> wp.Kernel:
     return made
 
 
+_STRUCTURES: dict[str, Any] = {}
+
+
 def structure(name: str, fields: dict[str, Any]) -> Any:
-    """A ``wp.struct`` of the given fields."""
-    return wp.struct(type(name, (), {"__annotations__": dict(fields), "__module__": __name__}))
-
-
-def function_from_source(
-    source: str, namespace: dict[str, Any], after_gradients: bool = False
-) -> wp.Function:
-    """Make a Warp function of generated source; ``namespace`` holds the names it refers to."""
-    name = re.search(r"def (\w+)\(", source).group(1)
-    digest = _digest(source, *namespace.keys(), *namespace.values())
-    filename = f"<particlesim {name} {digest}>"
-    scope = dict(namespace)
-    exec(compile(source, filename, "exec"), scope)
-    # Warp reads the source back through inspect, which asks linecache.
-    linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
-    module = wp.get_module(__name__)
-    return _made_once(scope[name], f"{name}_{digest}", after_gradients, module=module)
+    """A ``wp.struct`` of the given fields, one for the same ones, so kernels are reused."""
+    key = digest(name, *fields.keys(), *fields.values())
+    if key not in _STRUCTURES:
+        plain = type(name, (), {"__annotations__": dict(fields), "__module__": __name__})
+        _STRUCTURES[key] = wp.struct(plain)
+    return _STRUCTURES[key]

@@ -6,7 +6,8 @@ from .accuracy.tradeoff.sweep import tradeoff
 from .accuracy.tradeoff.table import Tradeoff
 from .accuracy.tune.report import Tuned
 from .accuracy.tune.tuning import tune
-from .constraints.boundary import BoxBoundary, PlaneBoundary, SphereBoundary
+from .constraints.boundary import Boundary
+from .constraints.boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
 from .constraints.constraint import Constraint
 from .constraints.contact import Contact
 from .constraints.distance import Distance
@@ -40,6 +41,7 @@ from .simulation.simulation import Simulation
 __all__ = [
     "SPH",
     "ArtificialViscosity",
+    "Boundary",
     "BoxBoundary",
     "Camera",
     "ConstantForce",

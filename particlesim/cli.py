@@ -1,4 +1,4 @@
-"""The command line: list, run, explain and measure scenes (see :mod:`particlesim.commands.scene_files`).
+"""The command line: list, run, measure and show scenes (see :mod:`particlesim.commands`).
 
 Exit codes: 0 done, 1 a run that failed, 2 arguments that do not fit, 130 interrupted. Whatever goes
 wrong is one line on stderr. Warp and USD are imported only when a scene is, so that help is quick.
@@ -12,9 +12,12 @@ from typing import Annotated
 
 import typer
 
-from .commands import measure, pictures, run
+from .commands import measure, run
+from .commands.render import render
 from .commands.shell import complain
 from .commands.usd import usd
+from .commands.view import view
+from .scene import __version__
 
 app = typer.Typer(
     help="Particle physics on NVIDIA Warp: forces and constraints in one loop.",
@@ -44,8 +47,6 @@ def _root(
     version: Annotated[bool, typer.Option("--version", help="Show the version.")] = False,
 ) -> None:
     if version:
-        from . import __version__
-
         typer.echo(f"particlesim {__version__}")
         raise typer.Exit
     if context.invoked_subcommand is None:
@@ -58,9 +59,9 @@ app.command()(run.explain)
 app.command()(measure.tradeoff)
 app.command()(measure.tune)
 app.command()(measure.stress)
-app.command()(pictures.render)
-app.command()(pictures.view)
-app.command()(pictures.plot)
+app.command()(render)
+app.command()(view)
+app.command()(run.plot)
 app.add_typer(usd, name="usd")
 
 

@@ -1,25 +1,39 @@
-"""Boundaries that hold particles off by their radius: one skeleton, a shape plugged into it."""
+"""Boundaries that hold particles off by their radius: one skeleton, a surface plugged into it."""
 
 import functools
-from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import warp as wp
 
 from ..precision import Precision, function, register, structure
-from .boundary_shapes import Shape
+from .boundary_shapes import normals_type
 from .constraints import bodies_type, place_function, rounding_function
 from .easing import ease_function, easing_type
 from .rigid_motion import frame_functions, pose_type
 
 
-def held_type(precision: Precision, shape: Shape) -> Any:
-    """The particles that a boundary of a shape holds; one type for all of as many sides."""
-    return _held_type(precision, shape.sides)
+class Form(NamedTuple):
+    """What the kernels of a boundary are made for.
+
+    Args:
+        surface: Where it is (see ``boundary_shapes``).
+        sides: At most how many of its sides a particle touches at once.
+        precision: Of the simulation.
+        params: Struct of what the surface takes, with friction and restitution.
+        compensated: Positions come with what rounding has kept from them.
+        moving: It has poses.
+    """
+
+    surface: wp.Function
+    sides: int
+    precision: Precision
+    params: Any
+    compensated: bool
+    moving: bool
 
 
 @functools.cache
-def _held_type(precision: Precision, sides: int) -> Any:
+def held_type(precision: Precision, sides: int) -> Any:
     """The particles that a boundary holds, with slack and grip by side.
 
     Grip is how far friction may still take particles back in this substep: mu times the normal
@@ -75,14 +89,14 @@ def bounce_function(precision: Precision) -> wp.Function:
 
 
 @functools.cache
-def meeting_function(shape: Shape, precision: Precision, params: Any, moving: bool) -> wp.Function:
+def meeting_function(form: Form) -> wp.Function:
     """``meet(i, w, x, e, slack, p, h) -> (back, N)``: what particle i at x + e meets in world w.
 
     The way back to each side, and the sides' normals (see ``boundary_shapes``).
     """
-    vec3, sides, each = precision.vec3, shape.sides, shape.each(precision)
-    Held = held_type(precision, shape)
-    surface, frame = shape.function(precision, params), frame_functions(precision)
+    surface, sides, precision, params, _, moving = form
+    vec3, each, Held = precision.vec3, precision.vector(sides), held_type(precision, sides)
+    frame = frame_functions(precision)
     inward, outward = frame.inward, frame.outward
 
     def meet(i: int, w: int, x: vec3, e: vec3, slack: each, p: params, h: Held):
@@ -96,20 +110,16 @@ def meeting_function(shape: Shape, precision: Precision, params: Any, moving: bo
                 N[a] = outward(N[a], h.pose[w])
         return back, N
 
-    return function(meet)
+    # Emitted behind the surface, which may itself stand behind the gradient that it takes.
+    return function(meet, after_gradients=True)
 
 
 @functools.cache
-def relative_functions(
-    shape: Shape, precision: Precision, moving: bool
-) -> tuple[wp.Function, wp.Function]:
-    """Against the surface: ``velocity_of(x, v, w, h)`` and ``slip_of(x, u, dt, w, h)``.
-
-    The velocity v of what is at x, and the way u by which it came there.
-    """
-    vec3, real, Held = precision.vec3, precision.scalar, held_type(precision, shape)
-    frame = frame_functions(precision)
-    velocity, way = frame.velocity, frame.way
+def velocity_function(form: Form) -> wp.Function:
+    """``velocity_of(x, v, w, h)``: the velocity v of what is at x, against the surface."""
+    precision, moving = form.precision, form.moving
+    vec3, Held = precision.vec3, held_type(precision, form.sides)
+    velocity = frame_functions(precision).velocity
 
     def velocity_of(x: vec3, v: vec3, w: int, h: Held):
         if wp.static(moving):
@@ -117,32 +127,22 @@ def relative_functions(
         else:
             return v
 
-    def slip_of(x: vec3, u: vec3, dt: real, w: int, h: Held):
-        if wp.static(moving):
-            return u - way(x, u, dt, h.pose[w])
-        else:
-            return u
-
-    return function(velocity_of), function(slip_of)
+    return function(velocity_of)
 
 
 @functools.cache
-def boundary_kernels(
-    shape: Shape, precision: Precision, params: Any, compensated: bool, forces: bool, moving: bool
-) -> SimpleNamespace:
-    """Kernels of a shape: ``begin`` a substep, ``project``, ``bounce``."""
-    vec3, real, each = precision.vec3, precision.scalar, shape.each(precision)
-    sides, normals = shape.sides, shape.normals(precision)
-    Bodies, Held = bodies_type(precision), held_type(precision, shape)
-    Easing = easing_type(precision)
-    kept, place = rounding_function(precision, compensated), place_function(precision, compensated)
-    ease = ease_function(precision)
-    friction, rebound = friction_function(precision), bounce_function(precision)
-    meet = meeting_function(shape, precision, params, moving)
-    velocity_of, slip_of = relative_functions(shape, precision, moving)
+def rubbing_function(form: Form) -> wp.Function:
+    """``rub(k, x, u, dt, w, back, N, mu, h)``: what friction takes back of the way u to x."""
+    precision, sides, moving = form.precision, form.sides, form.moving
+    vec3, real, each = precision.vec3, precision.scalar, precision.vector(sides)
+    normals, Held = normals_type(precision, sides), held_type(precision, sides)
+    friction, way = friction_function(precision), frame_functions(precision).way
 
-    def along_sides(k: int, u: vec3, back: each, N: normals, mu: real, h: Held):
-        """What friction takes of the way u on all sides."""
+    def along_sides(
+        k: int, x: vec3, u: vec3, dt: real, w: int, back: each, N: normals, mu: real, h: Held
+    ):
+        if wp.static(moving):
+            u = u - way(x, u, dt, h.pose[w])
         grip = h.grip[k] + back * mu
         if wp.static(sides > 1):
             for a in range(wp.static(sides)):
@@ -158,7 +158,24 @@ def boundary_kernels(
         h.grip[k] = grip
         return total
 
-    rub = function(along_sides)
+    return function(along_sides)
+
+
+@functools.cache
+def begin_kernel(form: Form) -> wp.Kernel:
+    """Kernel: as a substep starts, slack is measured where it is to be, and runs out."""
+    sides, precision, params = form.sides, form.precision, form.params
+    vec3, real, each = precision.vec3, precision.scalar, precision.vector(sides)
+    Bodies, Held, Easing = (
+        bodies_type(precision),
+        held_type(precision, sides),
+        easing_type(precision),
+    )
+    meet, velocity_of, ease = (
+        meeting_function(form),
+        velocity_function(form),
+        ease_function(precision),
+    )
 
     @register
     def begin_boundary(
@@ -181,6 +198,18 @@ def boundary_kernels(
         if p.friction > real(0.0):
             h.grip[k] = each()
 
+    return begin_boundary
+
+
+@functools.cache
+def project_kernel(form: Form) -> wp.Kernel:
+    """Kernel: particles are brought back to where they may be, and held along it."""
+    _, sides, precision, params, compensated, _ = form
+    vec3, real = precision.vec3, precision.scalar
+    Bodies, Held = bodies_type(precision), held_type(precision, sides)
+    kept, place = rounding_function(precision, compensated), place_function(precision, compensated)
+    meet, rub = meeting_function(form), rubbing_function(form)
+
     @register
     def project_boundary(
         first: int, parameters: wp.array(dtype=params), h: Held, b: Bodies, timed: real, dt: real
@@ -199,10 +228,22 @@ def boundary_kernels(
                 dx = dx + N[a] * back[a]
         if timed * p.friction > real(0.0):
             u = b.v[i] * dt + b.correction[i]
-            dx = dx - rub(k, slip_of(x, u, dt, w, h), back, N, p.friction, h)
+            dx = dx - rub(k, x, u, dt, w, back, N, p.friction, h)
         touched = dx[0] != real(0.0) or dx[1] != real(0.0) or dx[2] != real(0.0)
         if touched and b.w[i] > real(0.0):
             place(i, x, e, dx, b)
+
+    return project_boundary
+
+
+@functools.cache
+def bounce_kernel(form: Form, forces: bool) -> wp.Kernel:
+    """Kernel: normal velocities against the surface become what restitution makes of them."""
+    sides, precision, params = form.sides, form.precision, form.params
+    vec3, real = precision.vec3, precision.scalar
+    Bodies, Held = bodies_type(precision), held_type(precision, sides)
+    kept, rebound = rounding_function(precision, form.compensated), bounce_function(precision)
+    meet, velocity_of = meeting_function(form), velocity_function(form)
 
     @register
     def bounce_boundary(
@@ -235,4 +276,4 @@ def boundary_kernels(
                         dv = dv + n * rebound(wp.dot(before, n), now, p.restitution)
                 b.v[i] = b.v[i] + dv
 
-    return SimpleNamespace(begin=begin_boundary, project=project_boundary, bounce=bounce_boundary)
+    return bounce_boundary

@@ -1,13 +1,11 @@
 """Constraints as penalty forces: every particle gathers over its own tuples: nothing collides."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
-from ..engine.loops import Periodicity, box_type
-from ..precision import Precision, register
-from .constraints import bodies_type, tuples_type, view_function
+from ..precision import register
+from .constraints import Solved, view_function
 
 
 @wp.struct
@@ -21,14 +19,10 @@ class Seats:
 
 
 @functools.cache
-def force_kernels(
-    evaluate: wp.Function, precision: Precision, periodic: Periodicity, compensated: bool,
-    size: int, item: Any, relative: bool,
-) -> tuple[wp.Kernel, wp.Kernel]:  # fmt: skip
-    """Kernels: f_a -= grad_a C (C / alpha + beta dC/dt); energy C^2 / (2 alpha) and virial."""
-    vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
-    Bodies, Tuples = bodies_type(precision), tuples_type(precision, size, item)
-    view = view_function(evaluate, precision, periodic, compensated, size, item, relative)
+def force_kernel(law: Solved) -> wp.Kernel:
+    """Kernel: f_a -= grad_a C (C / alpha + beta dC/dt)."""
+    real, Box, Tuples, Bodies = law.types
+    vec3, size, view = law.precision.vec3, law.size, view_function(law)
 
     @register
     def constraint_force(
@@ -58,6 +52,15 @@ def force_kernels(
                 total = total - f
         f_io[i] = total
 
+    return constraint_force
+
+
+@functools.cache
+def measure_kernel(law: Solved) -> wp.Kernel:
+    """Kernel: energy C^2 / (2 alpha) and virial, to each of a tuple's particles its share."""
+    real, Box, Tuples, Bodies = law.types
+    size, view = law.size, view_function(law)
+
     @register
     def constraint_measure(
         first: int,
@@ -79,8 +82,7 @@ def force_kernels(
                 pull = real(0.0)
             w = -pull * wp.dot(G[a], X[a] - X[0])
             if wp.isfinite(w):
-                # Each of the tuple's particles gets its share.
                 energy_io[i] = energy_io[i] + wp.float64(C * pull / real(wp.static(2.0 * size)))
                 virial_io[i] = virial_io[i] + wp.float64(w)
 
-    return constraint_force, constraint_measure
+    return constraint_measure

@@ -6,17 +6,41 @@ the positions ``X`` (k rows) with the tuple's parameters ``q``. It is derived fr
 """
 
 import functools
+from dataclasses import dataclass
 from typing import Any
 
 import warp as wp
 
+from ..engine.integrate import compensated_sum
 from ..engine.loops import Periodicity, box_type, minimum_image
-from ..precision import Precision, function, function_from_source, register, structure
+from ..precision import APART, Precision, function, function_from_source, register, structure
 
 LARGEST = 1.0e30  # a multiplier beyond it, or NaN, comes of a gradient that does not exist
 
 
-@functools.cache
+@dataclass(frozen=True)
+class Solved:
+    """What kernels that solve or measure tuples are made for."""
+
+    evaluate: wp.Function
+    precision: Precision
+    periodic: Periodicity
+    compensated: bool
+    size: int  # particles of a tuple
+    item: Any  # struct of a tuple's parameters
+    relative: bool  # evaluated at positions seen from the tuple's first particle
+    unit: bool  # the gradients have unit length
+
+    @property
+    def types(self) -> tuple[Any, Any, Any, Any]:
+        """Scalar, box, tuples and bodies, which their kernels take."""
+        precision = self.precision
+        return (
+            precision.scalar, box_type(precision), tuples_type(precision, self.size, self.item),
+            bodies_type(precision),
+        )  # fmt: skip
+
+
 def bodies_type(precision: Precision) -> Any:
     """The arrays of the state that constraints read and correct."""
     vec3, real = precision.vec3, precision.scalar
@@ -30,7 +54,6 @@ def bodies_type(precision: Precision) -> Any:
     return structure(f"Bodies_{precision.name}", fields)
 
 
-@functools.cache
 def tuples_type(precision: Precision, size: int, item: Any) -> Any:
     """Tuples of ``size`` particles, sorted by colour."""
     fields = {
@@ -50,7 +73,6 @@ def positions_type(precision: Precision, size: int) -> Any:
     return wp.types.matrix(shape=(size, 3), dtype=precision.scalar)
 
 
-@functools.cache
 def rounding_function(precision: Precision, compensated: bool) -> wp.Function:
     """``kept(i, b)``: what rounding has kept from the position of particle i."""
     vec3, Bodies = precision.vec3, bodies_type(precision)
@@ -64,17 +86,14 @@ def rounding_function(precision: Precision, compensated: bool) -> wp.Function:
     return function(kept)
 
 
-@functools.cache
 def place_function(precision: Precision, compensated: bool) -> wp.Function:
     """``place(i, x, e, dx, b)``: particle i goes from x, with rounding error e, on by dx."""
-    vec3, Bodies = precision.vec3, bodies_type(precision)
+    vec3, Bodies, add = precision.vec3, bodies_type(precision), compensated_sum(precision)
 
     def place(i: int, x: vec3, e: vec3, dx: vec3, b: Bodies):
         if wp.static(compensated):
-            # Kahan (1965): what the sum rounds away is carried along.
-            step = dx + e
-            total = x + step
-            b.x_error[i] = step - (total - x)
+            total, error = add(x, dx, e)
+            b.x_error[i] = error
             b.x[i] = total
         else:
             b.x[i] = x + dx
@@ -83,7 +102,6 @@ def place_function(precision: Precision, compensated: bool) -> wp.Function:
     return function(place)
 
 
-@functools.cache
 def derived_evaluation(
     law: wp.Function, size: int, arguments: tuple[str, ...], precision: Precision, item: Any
 ) -> wp.Function:
@@ -100,15 +118,15 @@ def derived_evaluation(
     return function_from_source(source, namespace)
 
 
-@functools.cache
 def distance_evaluation(sign: int, precision: Precision, item: Any) -> wp.Function:
     """C = sign (|x_1 - x_0| - L). Coincident ends get a fixed direction and so part again."""
-    vec3, real, positions = precision.vec3, precision.scalar, positions_type(precision, 2)
+    real, positions = precision.scalar, positions_type(precision, 2)
+    apart = precision.vec3(*APART)
 
     def distance_constraint(X: positions, q: item):
         d = X[1] - X[0]
         r = wp.length(d)
-        n = vec3(real(0.48), real(0.6), real(0.64))
+        n = apart
         if r > real(0.0):
             n = d * (real(1.0) / r)
         if wp.static(sign < 0):
@@ -120,21 +138,17 @@ def distance_evaluation(sign: int, precision: Precision, item: Any) -> wp.Functi
 
 
 @functools.cache
-def view_function(
-    evaluate: wp.Function, precision: Precision, periodic: Periodicity, compensated: bool,
-    size: int, item: Any, relative: bool,
-) -> wp.Function:  # fmt: skip
+def view_function(law: Solved) -> wp.Function:
     """``view(r, box, t, b) -> (x, e, X, C, G)``: tuple r as it is now.
 
     Its positions, what rounding has kept from them, what the evaluation sees of both, in one piece
-    of a periodic box, and what it makes of it.
-
-    ``relative``: seen from the first particle, together with what rounding has kept: far from the
-    origin a distance is then as exact as near to it.
+    of a periodic box, and what it makes of it. Seen from the first particle, together with what
+    rounding has kept, a distance is far from the origin as exact as near to it.
     """
-    Box, positions = box_type(precision), positions_type(precision, size)
-    Bodies, Tuples = bodies_type(precision), tuples_type(precision, size, item)
-    image, wraps = minimum_image(precision, periodic), bool(periodic)
+    _real, Box, Tuples, Bodies = law.types
+    evaluate, size, relative, compensated = law.evaluate, law.size, law.relative, law.compensated
+    positions, wraps = positions_type(law.precision, size), bool(law.periodic)
+    image = minimum_image(law.precision, law.periodic)
 
     def view(r: int, box: wp.array(dtype=Box), t: Tuples, b: Bodies):
         ids = t.particle[r]
@@ -164,23 +178,16 @@ def view_function(
 
 
 @functools.cache
-def project_kernel(
-    evaluate: wp.Function, precision: Precision, periodic: Periodicity, compensated: bool,
-    size: int, item: Any, relative: bool, unit: bool,
-) -> wp.Kernel:  # fmt: skip
+def project_kernel(law: Solved) -> wp.Kernel:
     """Kernel: one sweep over the tuples of a colour (Macklin et al. 2016, eqs. 17, 18 and 26).
 
     dlam = (-C - alpha~ lam - gamma grad C . (x - x_prev)) / ((1 + gamma) sum w |grad C|^2 + alpha~)
     with alpha~ = alpha / dt^2 and gamma = alpha beta / dt; then dx_a = w_a grad_a C dlam. The way
     of this substep, x - x_prev, is v dt plus the corrections so far, which does not cancel.
-
-    ``unit``: the gradients have unit length.
     """
-    real, Box = precision.scalar, box_type(precision)
-    Bodies, Tuples = bodies_type(precision), tuples_type(precision, size, item)
-    weights = wp.types.vector(length=size, dtype=real)
-    view = view_function(evaluate, precision, periodic, compensated, size, item, relative)
-    place = place_function(precision, compensated)
+    real, Box, Tuples, Bodies = law.types
+    size, unit, weights = law.size, law.unit, law.precision.vector(law.size)
+    view, place = view_function(law), place_function(law.precision, law.compensated)
 
     @register
     def project_tuples(
@@ -247,14 +254,10 @@ def reset_kernel(precision: Precision) -> wp.Kernel:
 
 
 @functools.cache
-def strain_kernel(
-    evaluate: wp.Function, precision: Precision, periodic: Periodicity, compensated: bool,
-    size: int, item: Any, relative: bool,
-) -> wp.Kernel:  # fmt: skip
+def strain_kernel(law: Solved) -> wp.Kernel:
     """Kernel: force of each tuple, |lam| max_a |grad_a C| / dt^2; what exceeds its limit breaks."""
-    real, Box = precision.scalar, box_type(precision)
-    Bodies, Tuples = bodies_type(precision), tuples_type(precision, size, item)
-    view = view_function(evaluate, precision, periodic, compensated, size, item, relative)
+    real, Box, Tuples, Bodies = law.types
+    size, view = law.size, view_function(law)
 
     @register
     def strain_tuples(

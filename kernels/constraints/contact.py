@@ -6,12 +6,11 @@ from typing import Any
 import warp as wp
 
 from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
-from ..precision import Precision, register, structure
+from ..precision import Precision, function, register, structure
 from .constraints import bodies_type
 from .easing import ease_function, easing_type
 
 
-@functools.cache
 def contact_types(precision: Precision) -> tuple[Any, Any]:
     """Slot-ordered copies, and what the count of contacts writes."""
     vec3, real = precision.vec3, precision.scalar
@@ -90,14 +89,28 @@ def slack_kernels(precision: Precision, periodic: Periodicity) -> tuple[wp.Kerne
     return measure_slack, run_out
 
 
+def seen_function(precision: Precision, compensated: bool) -> wp.Function:
+    """``seen(s, i, pairs, b)``: position of particle i, of slot s, as pairs see it.
+
+    With compensated sums from a particle of the same world: differences far from the origin are
+    then as exact as near to it.
+    """
+    Bodies = bodies_type(precision)
+
+    def seen(s: int, i: int, pairs: Pairs, b: Bodies):
+        x = b.x[i]
+        if wp.static(compensated):
+            o = pairs.order[pairs.begin[pairs.world[s]]]
+            x = (x - b.x[o]) + (b.x_error[i] - b.x_error[o])
+        return x
+
+    return function(seen)
+
+
 @functools.cache
 def gather_kernel(precision: Precision, compensated: bool) -> wp.Kernel:
-    """Kernel: positions, radii and ways into slot order.
-
-    With compensated sums the positions are taken from a particle of the same world: differences
-    far from the origin are then as exact as near to it.
-    """
-    real = precision.scalar
+    """Kernel: positions, radii and ways into slot order."""
+    real, seen = precision.scalar, seen_function(precision, compensated)
     Bodies, (Data, _) = bodies_type(precision), contact_types(precision)
 
     @register
@@ -114,11 +127,7 @@ def gather_kernel(precision: Precision, compensated: bool) -> wp.Kernel:
     ):
         s = first + wp.tid()
         i = pairs.order[s]
-        x = b.x[i]
-        if wp.static(compensated):
-            o = pairs.order[pairs.begin[pairs.world[s]]]
-            x = (x - b.x[o]) + (b.x_error[i] - b.x_error[o])
-        d_out.x[s] = x
+        d_out.x[s] = seen(s, i, pairs, b)
         d_out.radius[s] = radius[i] - eased * slack[i]
         d_out.way[s] = b.v[i] * dt + b.correction[i] * follow
 
@@ -130,6 +139,7 @@ def gather_bounce_kernel(precision: Precision, compensated: bool, forces: bool) 
     """Kernel: for a bounce, positions after integration and velocities as the substep began."""
     vec3, real = precision.vec3, precision.scalar
     Bodies, (Data, _) = bodies_type(precision), contact_types(precision)
+    seen = seen_function(precision, compensated)
 
     @register
     def gather_bounces(
@@ -145,11 +155,7 @@ def gather_bounce_kernel(precision: Precision, compensated: bool, forces: bool) 
     ):
         s = first + wp.tid()
         i = pairs.order[s]
-        x = b.x[i] - b.correction[i]
-        if wp.static(compensated):
-            o = pairs.order[pairs.begin[pairs.world[s]]]
-            x = (b.x[i] - b.x[o]) + (b.x_error[i] - b.x_error[o]) - b.correction[i]
-        d_out.x[s] = x
+        d_out.x[s] = seen(s, i, pairs, b) - b.correction[i]
         d_out.radius[s] = radius[i] - slack[i]
         v = b.v[i]
         d_out.v[s] = v

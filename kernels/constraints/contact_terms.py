@@ -8,18 +8,16 @@ never overshoot (the sum of lam n is then bounded by what is split); it is n for
 and n/3 for contacts all around.
 """
 
-import functools
 from typing import Any
 
 import warp as wp
 
 from ..engine.loops import reader
-from ..precision import Precision, function
+from ..precision import APART, Precision, function
 from .constraints import bodies_type, place_function, rounding_function
 from .contact import contact_types
 
 
-@functools.cache
 def _separation_function(precision: Precision) -> wp.Function:
     """Distance and direction of a pair, also of a coincident one, without a branch.
 
@@ -27,22 +25,22 @@ def _separation_function(precision: Precision) -> wp.Function:
     the two, the same in a batch as alone, and not all in one line.
     """
     vec3, real = precision.vec3, precision.scalar
+    ax, ay, az = map(precision.scalar, APART)
 
     def separation(i: int, j: int, x_ij: vec3, r2: real, closest_squared: real):
         apart = r2 > closest_squared
         r = wp.sqrt(wp.where(apart, r2, closest_squared))
         k = wp.abs(i - j)
         side = wp.where(apart, real(0.0), wp.where(i < j, real(-1.0), real(1.0)))
-        a = wp.where((k & 1) == 0, real(0.48), real(-0.48))
-        b = wp.where((k & 2) == 0, real(0.6), real(-0.6))
-        c = wp.where((k & 4) == 0, real(0.64), real(-0.64))
+        a = wp.where((k & 1) == 0, ax, -ax)
+        b = wp.where((k & 2) == 0, ay, -ay)
+        c = wp.where((k & 4) == 0, az, -az)
         n = x_ij * (wp.where(apart, real(1.0), real(0.0)) / r) + vec3(a, b, c) * side
         return r, n
 
     return function(separation)
 
 
-@functools.cache
 def _of_pairs(precision: Precision) -> tuple[wp.Function, wp.Function, wp.Function]:
     """What terms take of a pair: ``separation`` as above; ``both(a, i, j)``, the sum of the two's
     numbers in an array, and ``between(a, i, j)``, the difference of their vectors.
@@ -59,7 +57,6 @@ def _of_pairs(precision: Precision) -> tuple[wp.Function, wp.Function, wp.Functi
     return _separation_function(precision), function(both), function(between)
 
 
-@functools.cache
 def crowding_term(precision: Precision, params: Any, bounce: bool) -> wp.Function:
     """Term: n n^T of a pair in contact, as its six entries; bounce: that approached at first."""
     vec3, real, six = precision.vec3, precision.scalar, precision.vector(6)
@@ -77,7 +74,6 @@ def crowding_term(precision: Precision, params: Any, bounce: bool) -> wp.Functio
     return function(crowding)
 
 
-@functools.cache
 def largest_eigenvalue(precision: Precision) -> wp.Function:
     """An upper bound of the largest eigenvalue of a positive symmetric matrix of six entries.
 
@@ -110,7 +106,6 @@ def largest_eigenvalue(precision: Precision) -> wp.Function:
     return function(bound)
 
 
-@functools.cache
 def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Function:
     """Term: multiplier times direction of a pair's correction.
 
@@ -149,7 +144,6 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
     return function(push)
 
 
-@functools.cache
 def bounce_term(precision: Precision, params: Any) -> wp.Function:
     """Term: impulse that sends a pair off at e times the speed it approached with.
 
@@ -172,7 +166,6 @@ def bounce_term(precision: Precision, params: Any) -> wp.Function:
     return function(bounce)
 
 
-@functools.cache
 def store_share(precision: Precision, params: Any) -> wp.Function:
     """Store: w times the ways in which normals are split, and friction.
 
@@ -201,7 +194,6 @@ def store_share(precision: Precision, params: Any) -> wp.Function:
     return function(keep_share)
 
 
-@functools.cache
 def store_correction(precision: Precision, params: Any, compensated: bool) -> wp.Function:
     """Store: x += w sum, and the same into the correction."""
     vec3, real = precision.vec3, precision.scalar
@@ -216,7 +208,6 @@ def store_correction(precision: Precision, params: Any, compensated: bool) -> wp
     return function(correct)
 
 
-@functools.cache
 def store_impulse(precision: Precision, params: Any) -> wp.Function:
     """Store: v += w sum."""
     vec3 = precision.vec3

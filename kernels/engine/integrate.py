@@ -10,7 +10,6 @@ from ..precision import Precision, function, register, structure
 from .loops import Periodicity, box_type
 
 
-@functools.cache
 def motion_type(precision: Precision) -> Any:
     """The arrays that integration touches; those that a scene does not require stay empty."""
     vec3, real = precision.vec3, precision.scalar
@@ -30,45 +29,52 @@ def motion_type(precision: Precision) -> Any:
     return structure(f"Motion_{precision.name}", fields)
 
 
-@functools.cache
-def integration_kernels(
-    precision: Precision, periodic: Periodicity, forces: bool, compensated: bool,
-    constrained: bool, remember: bool,
-) -> SimpleNamespace:  # fmt: skip
-    """The kernels for what a scene has.
+def compensated_sum(precision: Precision) -> wp.Function:
+    """``add(x, dx, e) -> (sum, error)``: what the sum rounds away goes with the next one's dx.
 
-    forces: there are forces. compensated: Kahan sums. constrained: corrections follow.
-    remember: keep the positions at the start of the substep.
+    Kahan (1965).
+    """
+    vec3 = precision.vec3
+
+    def kahan(x: vec3, dx: vec3, e: vec3):
+        step = dx + e
+        total = x + step
+        return total, step - (total - x)
+
+    return function(kahan)
+
+
+def motion_functions(
+    precision: Precision, forces: bool, compensated: bool, remember: bool
+) -> tuple[wp.Function, wp.Function, wp.Function]:
+    """``kick(i, dt, m) -> v``: v += w f dt; ``move(i, dx, m)``: x += dx; and ``wrap(i, m)``: a
+    particle that has left the periodic box comes back in on the other side.
     """
     vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
-    wraps = bool(periodic)
+    add = compensated_sum(precision)
 
     def kick(i: int, dt: real, m: Motion):
         v = m.v[i]
         if wp.static(forces):
             dv = m.f[i] * (m.w[i] * dt)
             if wp.static(compensated):
-                # Kahan (1965): what the sum rounds away is carried to the next one.
-                dv = dv + m.v_error[i]
-                total = v + dv
-                m.v_error[i] = dv - (total - v)
-                v = total
+                v, error = add(v, dv, m.v_error[i])
+                m.v_error[i] = error
             else:
                 v = v + dv
             m.v[i] = v
         return v
 
-    def move(i: int, dx: vec3, m: Motion):
+    def move_by(i: int, dx: vec3, m: Motion):
         x = m.x[i]
         if wp.static(compensated):
-            step = dx + m.x_error[i]
-            total = x + step
-            m.x_error[i] = step - (total - x)
-            m.x[i] = total
+            x, error = add(x, dx, m.x_error[i])
+            m.x_error[i] = error
         else:
-            m.x[i] = x + dx
+            x = x + dx
+        m.x[i] = x
 
-    add_position = function(move)
+    move = function(move_by)
 
     def wrap(i: int, m: Motion):
         # One box length at most: a substep that crosses a whole box is past any stability limit.
@@ -82,12 +88,27 @@ def integration_kernels(
                 crossed[a] = n
                 shift[a] = -real(n) * b.length[a]
         if wp.length_sq(shift) > real(0.0):
-            add_position(i, shift, m)
+            move(i, shift, m)
             m.image[i] = m.image[i] + crossed
             if wp.static(remember):
                 m.x_previous[i] = m.x_previous[i] + shift
 
-    add_force, into_box = function(kick), function(wrap)
+    return function(kick), move, function(wrap)
+
+
+@functools.cache
+def integration_kernels(
+    precision: Precision, periodic: Periodicity, forces: bool, compensated: bool,
+    constrained: bool, remember: bool,
+) -> SimpleNamespace:  # fmt: skip
+    """The kernels for what a scene has.
+
+    forces: there are forces. compensated: Kahan sums. constrained: corrections follow.
+    remember: keep the positions at the start of the substep.
+    """
+    vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
+    kick, move, wrap = motion_functions(precision, forces, compensated, remember)
+    wraps = bool(periodic)
 
     @register
     def advance(first: int, dt_kick: real, dt_drift: real, m: Motion):
@@ -95,17 +116,17 @@ def integration_kernels(
         i = first + wp.tid()
         if wp.static(remember):
             m.x_previous[i] = m.x[i]
-        v = add_force(i, dt_kick, m)
-        add_position(i, v * dt_drift, m)
+        v = kick(i, dt_kick, m)
+        move(i, v * dt_drift, m)
         if wp.static(constrained):
             m.correction[i] = vec3()
         if wp.static(wraps):
-            into_box(i, m)
+            wrap(i, m)
 
     @register
     def kick_only(first: int, dt: real, m: Motion):
         """v += w f dt."""
-        add_force(first + wp.tid(), dt, m)
+        kick(first + wp.tid(), dt, m)
 
     @register
     def follow_corrections(first: int, inverse_dt: real, m: Motion):
@@ -113,7 +134,7 @@ def integration_kernels(
         i = first + wp.tid()
         m.v[i] = m.v[i] + m.correction[i] * inverse_dt
         if wp.static(wraps):
-            into_box(i, m)
+            wrap(i, m)
 
     return SimpleNamespace(
         advance=advance, kick_only=kick_only, follow_corrections=follow_corrections

@@ -17,6 +17,7 @@ from typing import Any
 import warp as wp
 
 from ..precision import Precision, function, native, structure
+from ..warp_internals import elements, native_name, vector
 
 # Where the partners of slot i are: a row of a neighbour list, or the whole range of i's world.
 ROWS = "rows"
@@ -53,20 +54,10 @@ class Pairs:
     capacity: wp.int32
 
 
-def box_struct(precision: Precision) -> Any:
+def box_type(precision: Precision) -> Any:
     """Periodic box of a world: side lengths and their inverses, 0 on open axes."""
     fields = {k: precision.vec3 for k in ("lower", "length", "inverse")}
     return structure(f"Box_{precision.name}", fields)
-
-
-BOX: dict[str, Any] = {}
-
-
-def box_type(precision: Precision) -> Any:
-    """The box struct of a precision, made once."""
-    if precision.name not in BOX:
-        BOX[precision.name] = box_struct(precision)
-    return BOX[precision.name]
 
 
 def minimum_image(precision: Precision, periodic: Periodicity) -> wp.Function:
@@ -87,6 +78,17 @@ def minimum_image(precision: Precision, periodic: Periodicity) -> wp.Function:
     return function(nearest_image)
 
 
+def native_image(precision: Precision, periodic: Periodicity) -> str:
+    """The same in C++, of the numbers ``dx``, ``dy`` and ``dz`` and the struct ``box``."""
+    real = precision.c
+    floor = "__builtin_floorf" if real == "float" else "__builtin_floor"
+    return "\n".join(
+        f"d{axis} -= box.length[{n}] * {floor}(d{axis} * box.inverse[{n}] + ({real})0.5);"
+        for n, (axis, on) in enumerate(zip("xyz", periodic, strict=True))
+        if on
+    )
+
+
 @functools.cache
 def reader(precision: Precision, width: int | None = None) -> wp.Function:
     """``read(array, j)`` of numbers, or of vectors by their components, from an array without gaps.
@@ -100,9 +102,9 @@ def reader(precision: Precision, width: int | None = None) -> wp.Function:
     else:
         kind = precision.vector(width)
         components = ", ".join(f"data[{width} * (long long)j + {c}]" for c in range(width))
-        body = f"wp::vec_t<{width},{real}>({components})"
+        body = f"{vector(width, real)}({components})"
     snippet = f"""
-    const {real}* data = (const {real}*)array.data;
+    const {real}* data = {elements("array", real)};
     return {body};
 """
 
@@ -119,40 +121,40 @@ def plain_loop(
     Box, total = box_type(precision), precision.vector(width)
     image = minimum_image(precision, periodic)
 
-    def plain_rows(i: int, pairs: Pairs, box: Box, d: data, p: params):
+    rows = partners == ROWS
+
+    def plain_sum(i: int, pairs: Pairs, box: Box, d: data, p: params):
         x_i = d.x[i]
         result = total()
         row = wp.int64(i) * pairs.row_stride
-        for k in range(wp.min(pairs.count[i], pairs.capacity)):
-            j = pairs.index[row + wp.int64(k) * pairs.entry_stride]
-            x_ij = image(x_i - d.x[j], box)
-            r2 = wp.dot(x_ij, x_ij)
-            if r2 < p.cutoff_squared:
-                result += term(i, j, x_ij, r2, d, p)
-        return result
-
-    def plain_all(i: int, pairs: Pairs, box: Box, d: data, p: params):
-        x_i = d.x[i]
-        result = total()
-        w = pairs.world[i]
-        for j in range(pairs.begin[w], pairs.end[w]):
+        if wp.static(rows):
+            first = 0
+            last = wp.min(pairs.count[i], pairs.capacity)
+        else:
+            first = pairs.begin[pairs.world[i]]
+            last = pairs.end[pairs.world[i]]
+        for k in range(first, last):
+            j = k
+            if wp.static(rows):
+                j = pairs.index[row + wp.int64(k) * pairs.entry_stride]
             x_ij = image(x_i - d.x[j], box)
             r2 = wp.dot(x_ij, x_ij)
             if j != i and r2 < p.cutoff_squared:
                 result += term(i, j, x_ij, r2, d, p)
         return result
 
-    return function(plain_rows if partners == ROWS else plain_all, after_gradients=True)
+    return function(plain_sum, after_gradients=True)
 
 
 _HEAD = {
-    ROWS: """
-    const int count = pairs.count.data[i] < pairs.capacity ? pairs.count.data[i] : pairs.capacity;
-    const int* row = pairs.index.data + (long long)i * pairs.row_stride;
-    const int first = 0, last = count;""",
-    ALL: """
-    const int w = pairs.world.data[i];
-    const int first = pairs.begin.data[w], last = pairs.end.data[w];""",
+    ROWS: f"""
+    const int found = {elements("pairs.count", "int")}[i];
+    const int first = 0, last = found < pairs.capacity ? found : pairs.capacity;
+    const int* row = {elements("pairs.index", "int")} + (long long)i * pairs.row_stride;""",
+    ALL: f"""
+    const int w = {elements("pairs.world", "int")}[i];
+    const int first = {elements("pairs.begin", "int")}[w], last = {elements("pairs.end", "int")}[w];
+""",
 }
 _PARTNER = {ROWS: "row[k]", ALL: "k"}
 _INSIDE = {ROWS: "r2 < p.cutoff_squared", ALL: "(j != i) & (r2 < p.cutoff_squared)"}
@@ -168,15 +170,9 @@ def native_loop(
     select, so the loop has no branch of its own. Rows must be contiguous (entry stride 1).
     """
     real, Box, total = precision.c, box_type(precision), precision.vector(width)
-    image = "\n".join(
-        f"        d{axis} -= box.length[{n}] * __builtin_floor{'f' if real == 'float' else ''}"
-        f"(d{axis} * box.inverse[{n}] + ({real})0.5);"
-        for n, (axis, on) in enumerate(zip("xyz", periodic, strict=True))
-        if on
-    )
-    vec, sums = f"wp::vec_t<3,{real}>", range(width)
+    unit, vec3, sums = precision.scalar(1.0), precision.vec3, range(width)
     snippet = f"""{_HEAD[partners]}
-    const {real}* x = (const {real}*)d.x.data;
+    const {real}* x = {elements("d.x", real)};
     const {real} xi = x[3*i], yi = x[3*i+1], zi = x[3*i+2];
     {"".join(f"{real} sum{s} = 0; " for s in sums)}
     {{
@@ -185,20 +181,21 @@ def native_loop(
     for (int k = first; k < last; ++k) {{
         const int j = {_PARTNER[partners]};
         {real} dx = xi - x[3*j], dy = yi - x[3*j+1], dz = zi - x[3*j+2];
-{image}
+        {native_image(precision, periodic)}
         const {real} r2 = dx*dx + dy*dy + dz*dz;
         const bool inside = {_INSIDE[partners]};
         const {real} safe = inside ? r2 : ({real})1;
-        const wp::vec_t<{width},{real}> t =
-            {term.native_func}(i, j, {vec}(dx, dy, dz), safe, d, p);
+        const {vector(width, real)} t =
+            {native_name(term)}(i, j, {vector(3, real)}(dx, dy, dz), safe, d, p);
         {"".join(f"sum{s} += inside ? t[{s}] : ({real})0; " for s in sums)}
     }}
     }}
-    wp::vec_t<{width},{real}> result;
+    {vector(width, real)} result;
     {"".join(f"result[{s}] = sum{s}; " for s in sums)}
     return result;
 """
 
-    def native_sum(i: int, pairs: Pairs, box: Box, d: data, p: params) -> total: ...
+    def native_sum(i: int, pairs: Pairs, box: Box, d: data, p: params) -> total:
+        term(i, i, vec3(), unit, d, p)
 
     return native(native_sum, snippet)

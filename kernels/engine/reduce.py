@@ -4,15 +4,25 @@ import functools
 
 import warp as wp
 
-from ..precision import Precision, register
+from ..precision import Precision, function, register
 
 QUANTITIES = 10  # mass, momentum (3), angular momentum (3), kinetic, potential, virial
+
+
+def widened(precision: Precision) -> wp.Function:
+    """``wide(v)``: a vector in float64."""
+    vec3 = precision.vec3
+
+    def wide(v: vec3):
+        return wp.vec3d(wp.float64(v[0]), wp.float64(v[1]), wp.float64(v[2]))
+
+    return function(wide)
 
 
 @functools.cache
 def block_sums_kernel(precision: Precision) -> wp.Kernel:
     """Kernel: one thread sums one block of particles, one after the other, in float64."""
-    vec3, real = precision.vec3, precision.scalar
+    vec3, real, wide = precision.vec3, precision.scalar, widened(precision)
 
     @register
     def block_sums(
@@ -38,10 +48,9 @@ def block_sums_kernel(precision: Precision) -> wp.Kernel:
             m_i = wp.float64(m[i])
             mass += m_i
             if w[i] > real(0.0):  # a pinned particle's momentum is not the scene's
-                x_i = wp.vec3d(wp.float64(x[i][0]), wp.float64(x[i][1]), wp.float64(x[i][2]))
-                v_i = wp.vec3d(wp.float64(v[i][0]), wp.float64(v[i][1]), wp.float64(v[i][2]))
+                v_i = wide(v[i])
                 p += m_i * v_i
-                angular += m_i * wp.cross(x_i, v_i)
+                angular += m_i * wp.cross(wide(x[i]), v_i)
                 kinetic += wp.float64(0.5) * m_i * wp.dot(v_i, v_i)
             potential += energy[i]
             total_virial += virial[i]

@@ -16,6 +16,7 @@ import functools
 import warp as wp
 
 from ..precision import native, register
+from ..warp_internals import RUN_PACKED, elements
 
 # Words of the board: state, chunks done, leave, the stage that the caller is at, how many are left
 # and whether this one has been posted, then the chunks of the latest posts in turn. A stage is two
@@ -23,11 +24,8 @@ from ..precision import native, register
 STATE, DONE, LEAVE, STAGE, LEFT, POSTED, POSTS, RING = 0, 1, 2, 3, 4, 5, 8, 64
 
 _SHARED = f"""
-    unsigned long long* b = (unsigned long long*)board.data;
-    typedef void (*entry)(void*, void*);
-    auto run = [](const unsigned long long* chunk) {{
-        ((entry)chunk[0])((void*)chunk[1], (void*)chunk[2]);
-    }};
+    unsigned long long* b = {elements("board", "unsigned long long")};
+    auto run = [](const unsigned long long* packed) {{ {RUN_PACKED}; }};
     auto left = [](unsigned long long state) -> bool {{
         return (state & 0xffffull) + (state >> 16 & 0xffffull) < (state >> 32 & 0xffffull);
     }};

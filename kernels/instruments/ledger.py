@@ -1,12 +1,30 @@
 """The ledger's kernels: what a part has changed, and its work and impulse summed by blocks."""
 
 import functools
+from typing import Any
 
 import warp as wp
 
-from ..precision import Precision, function, register
+from ..engine.reduce import widened
+from ..precision import Precision, register, structure
 
 TOTALS = wp.types.vector(length=7, dtype=wp.float64)  # work, impulse (3), angular impulse (3)
+
+
+def ledger_type(precision: Precision) -> Any:
+    """What all accounts read: blocks, masses, and the motion as a substep began and is now."""
+    vec3, real = precision.vec3, precision.scalar
+    fields = {
+        "begin": wp.array(dtype=wp.int32),  # of a block, and its end
+        "end": wp.array(dtype=wp.int32),
+        "m": wp.array(dtype=real),
+        "w": wp.array(dtype=real),
+        "x0": wp.array(dtype=vec3),
+        "v0": wp.array(dtype=vec3),
+        "x": wp.array(dtype=vec3),
+        "v": wp.array(dtype=vec3),
+    }
+    return structure(f"Ledger_{precision.name}", fields)
 
 
 @functools.cache
@@ -40,23 +58,12 @@ def account_kernel(precision: Precision) -> wp.Kernel:
     impulse moves, are left out. One thread sums one block, one particle after the other.
     """
     vec3, real = precision.vec3, precision.scalar
-
-    def wide(v: vec3):
-        return wp.vec3d(wp.float64(v[0]), wp.float64(v[1]), wp.float64(v[2]))
-
-    double = function(wide)
+    Ledger, wide = ledger_type(precision), widened(precision)
 
     @register
     def account(
         first: int,
-        begin: wp.array(dtype=wp.int32),
-        end: wp.array(dtype=wp.int32),
-        m: wp.array(dtype=real),
-        w: wp.array(dtype=real),
-        x0: wp.array(dtype=vec3),
-        v0: wp.array(dtype=vec3),
-        x: wp.array(dtype=vec3),
-        v: wp.array(dtype=vec3),
+        g: Ledger,
         early: wp.array(dtype=vec3),
         late: wp.array(dtype=vec3),
         early_scale: wp.float64,
@@ -68,17 +75,17 @@ def account_kernel(precision: Precision) -> wp.Kernel:
         work = wp.float64(0.0)
         impulse = wp.vec3d()
         angular = wp.vec3d()
-        for i in range(begin[b], end[b]):
-            if w[i] > real(0.0):
+        for i in range(g.begin[b], g.end[b]):
+            if g.w[i] > real(0.0):
                 factor = wp.float64(1.0)
                 if of_velocity != 0:
-                    factor = wp.float64(m[i])
-                J_early = double(early[i]) * (early_scale * factor)
-                J_late = double(late[i]) * (late_scale * factor)
+                    factor = wp.float64(g.m[i])
+                J_early = wide(early[i]) * (early_scale * factor)
+                J_late = wide(late[i]) * (late_scale * factor)
                 J = J_early + J_late
-                work += wp.float64(0.5) * wp.dot(J, double(v0[i]) + double(v[i]))
+                work += wp.float64(0.5) * wp.dot(J, wide(g.v0[i]) + wide(g.v[i]))
                 impulse += J
-                angular += wp.cross(double(x0[i]), J_early) + wp.cross(double(x[i]), J_late)
+                angular += wp.cross(wide(g.x0[i]), J_early) + wp.cross(wide(g.x[i]), J_late)
         total = total_io[b]
         total[0] = total[0] + work
         for a in range(3):

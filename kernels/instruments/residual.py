@@ -5,22 +5,17 @@ from typing import Any
 
 import warp as wp
 
-from ..constraints.boundary import held_type, meeting_function
-from ..constraints.boundary_shapes import Shape
-from ..constraints.constraints import bodies_type, rounding_function, tuples_type, view_function
+from ..constraints.boundary import Form, held_type, meeting_function
+from ..constraints.constraints import Solved, bodies_type, rounding_function, view_function
 from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
 from ..precision import Precision, register
 
 
 @functools.cache
-def tuples_kernel(
-    evaluate: wp.Function, precision: Precision, periodic: Periodicity, compensated: bool,
-    size: int, item: Any, relative: bool,
-) -> wp.Kernel:  # fmt: skip
+def tuples_kernel(law: Solved) -> wp.Kernel:
     """Kernel: C of each tuple; of an inequality what is below 0, of a broken one nothing."""
-    real, Box = precision.scalar, box_type(precision)
-    Bodies, Tuples = bodies_type(precision), tuples_type(precision, size, item)
-    view = view_function(evaluate, precision, periodic, compensated, size, item, relative)
+    real, Box, Tuples, Bodies = law.types
+    view = view_function(law)
 
     @register
     def miss_tuples(
@@ -43,14 +38,12 @@ def tuples_kernel(
 
 
 @functools.cache
-def boundary_kernel(
-    shape: Shape, precision: Precision, params: Any, compensated: bool, moving: bool
-) -> wp.Kernel:
+def boundary_kernel(form: Form) -> wp.Kernel:
     """Kernel: how deep each particle is inside of a boundary, on its worst side."""
-    real, each = precision.scalar, shape.each(precision)
-    Bodies, Held = bodies_type(precision), held_type(precision, shape)
-    meet = meeting_function(shape, precision, params, moving)
-    kept = rounding_function(precision, compensated)
+    _, sides, precision, params, compensated, _ = form
+    real, each = precision.scalar, precision.vector(sides)
+    Bodies, Held = bodies_type(precision), held_type(precision, sides)
+    meet, kept = meeting_function(form), rounding_function(precision, compensated)
 
     @register
     def miss_boundary(

@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from ..precision import Precision, function, native, register
+from ..warp_internals import elements
 
 
 def _plain(precision: Precision) -> wp.Function:
@@ -36,8 +37,8 @@ def _vectorised(precision: Precision) -> wp.Function:
         for k in range(3)
     )
     snippet = f"""
-    const {c}* x_ = (const {c}*)x.data;
-    const {c}* v_ = (const {c}*)v.data;
+    const {c}* x_ = {elements("x", c)};
+    const {c}* v_ = {elements("v", c)};
     const {c} l0 = low[0], l1 = low[1], l2 = low[2], h0 = high[0], h1 = high[1], h2 = high[2];
     int bad = 0;
 #pragma clang loop vectorize(enable)

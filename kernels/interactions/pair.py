@@ -124,22 +124,19 @@ def pair_kernel(
     ``store(i, particle, total, d, p, o)`` writes row i of the outputs in slot order, or row
     ``particle`` of the state's.
     """
-    key = (
-        term.native_func, store.native_func, width, precision.name, tuple(periodic), partners,
-        vectorised,
-    )  # fmt: skip
+    key = (term, store, width, precision.name, tuple(periodic), partners, vectorised)
     if key not in _KERNELS:
         make = native_loop if vectorised else plain_loop
         loop = make(term, data, params, width, precision, periodic, partners)
-        _KERNELS[key] = _pair_kernel(loop, term, store, data, params, out, precision, vectorised)
+        _KERNELS[key] = _pair_kernel(loop, store, data, params, out, precision, vectorised)
     return _KERNELS[key]
 
 
 _KERNELS: dict[tuple, wp.Kernel] = {}
 
 
-def _pair_kernel(loop, term, store, data, params, out, precision, vectorised) -> wp.Kernel:
-    Box, real, vec3 = box_type(precision), precision.scalar, precision.vec3
+def _pair_kernel(loop, store, data, params, out, precision, vectorised) -> wp.Kernel:
+    Box = box_type(precision)
 
     @functools.partial(register, cpu_only=vectorised)
     def sum_over_partners(
@@ -153,9 +150,6 @@ def _pair_kernel(loop, term, store, data, params, out, precision, vectorised) ->
         i = first + wp.tid()
         w = pairs.world[i]
         p = parameters[w]
-        if wp.static(vectorised):
-            # The native loop calls the term by name: this has Warp emit the term before it.
-            unused = term(i, i, vec3(), real(1.0), d, p)  # noqa: F841
         store(i, pairs.order[i], loop(i, pairs, box[w], d, p), d, p, o)
 
     return sum_over_partners

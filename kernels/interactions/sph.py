@@ -17,8 +17,8 @@ from typing import Any
 import warp as wp
 
 from ..engine.loops import Periodicity, box_type, minimum_image, reader
-from ..engine.neighbors import cells_type
 from ..precision import Precision, function, function_from_source, register
+from ..warp_internals import argument_names
 
 # Where coincident particles are pushed along, within the line or plane of a lower dimension.
 DIRECTIONS = {1: (1.0, 0.0, 0.0), 2: (0.6, 0.8, 0.0), 3: (0.48, 0.6, 0.64)}
@@ -29,7 +29,7 @@ def bound_law(
     precision: Precision, params: Any,
 ) -> wp.Function:  # fmt: skip
     """``name(*variables, p)`` that calls ``law`` with, for each of its arguments, its source."""
-    arguments = ", ".join(sources[argument] for argument in law.input_types)
+    arguments = ", ".join(sources[argument] for argument in argument_names(law))
     signature = ", ".join(f"{variable}: real" for variable in variables)
     source = f"def {name}({signature}, p: Params):\n    return law({arguments})\n"
     return function_from_source(source, {"law": law, "real": precision.scalar, "Params": params})
@@ -139,19 +139,6 @@ def keep_measure(
         o.virial[particle] = o.virial[particle] + wp.float64(total[0])
 
     return function(keep)
-
-
-@functools.cache
-def cell_coordinates_kernel(precision: Precision) -> wp.Kernel:
-    """Cell coordinates of points, which a grid is built from and asked with."""
-    vec3, Cells = precision.vec3, cells_type(precision)
-
-    @register
-    def point_cells(first: int, cells: Cells, x: wp.array(dtype=vec3), u_out: wp.array(dtype=vec3)):
-        k = first + wp.tid()
-        u_out[k] = cells.turn * (x[k] - cells.origin)
-
-    return point_cells
 
 
 @functools.cache

@@ -1,1 +1,5 @@
-"""Speed against accuracy: sweeps, searches and stress, each measured."""
+"""Speed against accuracy: trade-offs, tuning and stress, over what they share.
+
+A study is a scene to simulate in many ways; its runs are timed, and judged by a known answer, by
+conservation or by a reference that is refined until it settles.
+"""

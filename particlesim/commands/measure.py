@@ -2,39 +2,37 @@
 
 from __future__ import annotations
 
+import contextlib
+import inspect
+import warnings
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from ..output.progress import Meter, bar
-from .scene_files import label, load_scene
-from .shell import (
-    Debug,
-    Device,
-    Frames,
-    Options,
-    Overwrite,
-    SceneName,
-    Worlds,
-    one_line_errors,
-    start_warp_quietly,
-)
+from .. import validate
+from ..output.progress import label
+from .scene_files import parse_options, parse_vary, split_options
+from .shell import Debug, Device, Frames, Options, Overwrite, SceneName, Worlds, load, opened
+
+Vary = Annotated[
+    list[str] | None,
+    typer.Option(metavar="NAME=VALUE,...", help="Values of a setting or option; repeat."),
+]
+ErrorName = Annotated[
+    str | None,
+    typer.Option(help="known, converged, energy or momentum. Default: known if it is."),
+]
 
 
 def tradeoff(
     scene: SceneName,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=VALUE,...", help="Values of a setting or option; repeat."),
-    ] = None,
+    vary: Vary = None,
     options: Options = None,
     frames: Frames = None,
     repeats: Annotated[int, typer.Option(min=1, help="Timed runs of each setting.")] = 3,
-    error: Annotated[
-        str | None,
-        typer.Option(help="known, converged, energy or momentum. Default: known if it is."),
-    ] = None,
+    error: ErrorName = None,
     reference: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME=VALUE", help="What the converged reference takes; repeat."),
@@ -47,32 +45,44 @@ def tradeoff(
     debug: Debug = False,
 ) -> None:
     """Measure what settings cost, and how accurate they are."""
-    meter = Meter()
-    with one_line_errors(meter, debug):
-        from . import tradeoff as command
+    with opened(debug) as meter:
+        _check_outputs(plot, save, overwrite)
+        module = load(scene, debug)
+        from ..accuracy.judging import ERRORS
+        from ..accuracy.tradeoff.sweep import tradeoff as sweep
 
-        command.check_outputs({"--plot": plot, "--save": save}, overwrite)
-        if not debug:
-            start_warp_quietly()
-        table = command.sweep(
-            load_scene(scene), options or (), vary or (), error, reference or (), meter,
-            frames=frames, repeats=repeats, bound=bound, device=device,
-        )  # fmt: skip
+        if error is not None:
+            validate.choice("tradeoff", "--error", error, ERRORS)
+        varied = parse_vary(vary or ())
+        if not varied:
+            raise ValueError(
+                "--vary must be given, got nothing; write --vary substeps=1,2,5, and repeat it "
+                "for further knobs."
+            )
+        fixed = parse_options(options or ())
+        # An option that build needs is set by being varied.
+        needed = [name for name in inspect.signature(module.build).parameters if name in varied]
+        build, knobs = split_options(module, {**{n: varied[n][0] for n in needed}, **fixed})
+        with _one_line_warnings(), meter.count(label(module), at_last="reference") as progress:
+            table = sweep(
+                module.build, varied, error=error, reference=parse_options(reference or ()) or None,
+                repeats=repeats, frames=frames, settings=module.settings.replace(**knobs),
+                options={name: value for name, value in build.items() if name in fixed},
+                bound=bound, device=device, progress=progress,
+            )  # fmt: skip
         typer.echo(str(table))
-        command.write(table, plot, save)
+        # That these may be replaced has been checked.
+        if save is not None:
+            table.save(save, overwrite=True)
+        if plot is not None:
+            table.plot(plot, overwrite=True)
 
 
 def tune(
     scene: SceneName,
     error: Annotated[float, typer.Option(help="The error to stay under.")] = 1e-3,
-    by: Annotated[
-        str | None,
-        typer.Option(help="known, converged, energy or momentum. Default: known if it is."),
-    ] = None,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=VALUE,...", help="Values of a setting or option; repeat."),
-    ] = None,
+    by: ErrorName = None,
+    vary: Vary = None,
     options: Options = None,
     frames: Frames = None,
     seeds: Annotated[int, typer.Option(min=1, help="Seeds to try everything with.")] = 3,
@@ -80,16 +90,26 @@ def tune(
     debug: Debug = False,
 ) -> None:
     """Find the cheapest settings under an error, and print them as Python."""
-    meter = Meter()
-    with one_line_errors(meter, debug):
-        from . import tune as command
+    with opened(debug) as meter:
+        module = load(scene, debug)
+        from ..accuracy.judging import ERRORS
+        from ..accuracy.tune.tuning import tune as search
 
-        if not debug:
-            start_warp_quietly()
-        found = command.search(
-            load_scene(scene), options or (), vary or (), by, meter,
-            error=error, frames=frames, seeds=seeds, device=device,
-        )  # fmt: skip
+        if by is not None:
+            validate.choice("tune", "--by", by, ERRORS)
+        build, knobs = split_options(module, parse_options(options or ()))
+        meter.unit = "settings"
+
+        def show(trial: Any) -> None:
+            meter.done = meter.frames = meter.done + 1
+            typer.echo(str(trial), err=True)
+
+        with _one_line_warnings():
+            found = search(
+                module.build, error, by=by, vary=parse_vary(vary or ()), seeds=seeds,
+                frames=frames, settings=module.settings.replace(**knobs), options=build,
+                device=device, progress=show,
+            )  # fmt: skip
         typer.echo(str(found))
 
 
@@ -105,17 +125,39 @@ def stress(
     debug: Debug = False,
 ) -> None:
     """Run a scene at the extremes, and say where it held, refused, recovered or failed."""
-    with one_line_errors(Meter(), debug):
-        from . import stress as command
+    with opened(debug) as meter:
+        module = load(scene, debug)
+        from ..accuracy.stress.sweep import stress as sweep
 
-        if not debug:
-            start_warp_quietly()
-        module = load_scene(scene)
-        with bar(label(module), "cases") as show:
-            table = command.sweep(
-                module, options or (), show,
-                frames=frames, tolerance=tolerance, device=device, worlds=worlds,
+        build, knobs = split_options(module, parse_options(options or ()))
+        with meter.count(label(module), "cases") as progress:
+            table = sweep(
+                lambda: module.build(**build), module.settings.replace(**knobs), frames=frames,
+                tolerance=tolerance, device=device, worlds=worlds, progress=progress,
             )  # fmt: skip
         typer.echo(str(table))
         if table.count("failed"):
             raise typer.Exit(1)
+
+
+def _check_outputs(picture: Path | None, table: Path | None, overwrite: bool) -> None:
+    """Find out before a long sweep what would stop it from being written."""
+    from ..accuracy.table import check_new
+    from ..accuracy.tradeoff import output, plot
+
+    consent = "give --overwrite"
+    if table is not None:
+        check_new("tradeoff", "--save", table, output.FORMATS, overwrite, consent)
+    if picture is not None:
+        check_new("tradeoff", "--plot", picture, plot.FORMATS, overwrite, consent)
+        plot.figure_class()
+
+
+@contextlib.contextmanager
+def _one_line_warnings() -> Iterator[None]:
+    """Print what is warned of when all is done, a line each."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for warning in caught:
+        typer.echo(f"warning: {' '.join(str(warning.message).split())}", err=True)

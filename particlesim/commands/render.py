@@ -1,25 +1,107 @@
-"""The command ``particlesim render``: pictures and films of recordings and scenes."""
+"""The command render: pictures and films of recordings and scenes."""
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
 from .. import validate
-from ..output.progress import Meter, bar
+from ..output.progress import Meter
 from ..pictures.render import film, image
 from ..pictures.render.camera import FIELD_OF_VIEW, Camera
-from ..pictures.render.stage import View
+from .shell import (
+    USD,
+    Color,
+    Debug,
+    Device,
+    Options,
+    Overwrite,
+    load,
+    opened,
+    simulation,
+    start_warp,
+)
 
 OWNER = "render"
 ENGINES = ("warp", "cycles")
-USD = (".usda", ".usd", ".usdc", ".usdz")
+
+File = Annotated[str, typer.Argument(metavar="FILE", help="A recording, any USD file, or a scene.")]
+Out = Annotated[Path, typer.Option(help="Picture, .png, .jpg, .webp; or film, .gif, .mp4.")]
+Frame = Annotated[
+    int | None, typer.Option(help="Of a picture. Default: the last; of a scene, the first.")
+]
+Frames = Annotated[
+    str | None, typer.Option(metavar="A:B[:K]", help="Of a film, each K-th. Default: all.")
+]
+Viewpoint = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PX,PY,PZ,TX,TY,TZ[,ANGLE]",
+        help="Position, target, and angle of view [degrees]. Default: the file's own.",
+    ),
+]
+ColorMap = Annotated[str, typer.Option(help="viridis, magma, cubehelix, coolwarm or gray.")]
+ColorRange = Annotated[
+    str | None, typer.Option(metavar="LOW,HIGH", help="Values with the first and last colour.")
+]
+Pixels = Annotated[int, typer.Option(min=1, help="Pixels.")]
+Ground = Annotated[bool | None, typer.Option(help="A ground. Default: where there are boundaries.")]
+Rate = Annotated[
+    float | None, typer.Option(help="Pictures a second of a film. Default: the file's.")
+]
+Engine = Annotated[str, typer.Option(help="warp, or cycles (Blender's, by bpy).")]
+Samples = Annotated[int, typer.Option(min=1, help="Of a pixel, by cycles.")]
+Interpreter = Annotated[
+    str | None, typer.Option(help="Interpreter with bpy. Default: $BLENDER_PYTHON, or this one.")
+]
+
+
+def render(
+    file: File,
+    out: Out,
+    frame: Frame = None,
+    frames: Frames = None,
+    camera: Viewpoint = None,
+    color: Color = None,
+    color_map: ColorMap = "viridis",
+    color_range: ColorRange = None,
+    width: Pixels = 1280,
+    height: Pixels = 720,
+    ground: Ground = None,
+    fps: Rate = None,
+    engine: Engine = "warp",
+    samples: Samples = 64,
+    python: Interpreter = None,
+    options: Options = None,
+    device: Device = None,
+    overwrite: Overwrite = False,
+    debug: Debug = False,
+) -> None:
+    """Draw a picture or a film of a recording, or a picture of a scene."""
+    with opened(debug) as meter, tempfile.TemporaryDirectory(prefix="particlesim-") as folder:
+        request = Request(
+            out, frame, frames, camera, color, color_map, color_range, width, height, ground, fps,
+            engine, samples, python, device, overwrite,
+        )  # fmt: skip
+        path = Path(file)
+        if path.suffix.lower() in USD:
+            start_warp(debug)
+        elif request.is_film:
+            raise validate.fail(
+                OWNER, "FILE", "be a recording for a film", file,
+                f"run it first: particlesim run {file} --out {path.stem}.usda",
+            )  # fmt: skip
+        else:
+            path = Path(folder) / "frame.usda"
+            _record(simulation(load(file, debug), options, device, None), request, path)
+        typer.echo(_draw(path, file, request, meter))
 
 
 @dataclass(frozen=True)
@@ -67,7 +149,7 @@ class Request:
         """Whether many pictures are asked for."""
         return self.out.suffix.lower() in film.FORMATS
 
-    def viewpoint(self, view: View) -> Camera:
+    def viewpoint(self, view: Any) -> Camera:
         """The camera: the one asked for, or the file's own, or one that sees all."""
         if self.camera is None:
             points, radius = view.geometry.points()
@@ -78,29 +160,8 @@ class Request:
         return Camera(numbers[:3], numbers[3:6], view.up, angle)
 
 
-def render(name: str, request: Request, meter: Meter, simulate: Callable[[], Any]) -> str:
-    """Make what is asked for, and say what was done.
-
-    Args:
-        name: A USD file, or a scene.
-        request: What is asked for.
-        meter: Counts the frames of a film.
-        simulate: Makes the simulation, where ``name`` is a scene.
-    """
-    path = Path(name)
-    with tempfile.TemporaryDirectory(prefix="particlesim-") as folder:
-        if path.suffix.lower() not in USD:
-            if request.is_film:
-                raise validate.fail(
-                    OWNER, "FILE", "be a recording for a film", name,
-                    f"run it first: particlesim run {name} --out {path.stem}.usda",
-                )  # fmt: skip
-            path = _recorded(simulate(), request, Path(folder) / "frame.usda")
-        return _render_file(path, name, request, meter)
-
-
-def _recorded(sim: Any, request: Request, path: Path) -> Path:
-    """One frame of a scene, as a file."""
+def _record(sim: Any, request: Request, path: Path) -> None:
+    """Write one frame of a scene."""
     from ..output.usd.recorder import UsdRecorder
 
     sim.run(frames=request.frame or 0)
@@ -108,10 +169,9 @@ def _recorded(sim: Any, request: Request, path: Path) -> Path:
     layout = "grid" if sim.world_count > 1 else None
     with UsdRecorder(sim, path, frames=0, fields=fields, layout=layout) as recorder:
         recorder.write()
-    return path
 
 
-def _render_file(path: Path, name: str, request: Request, meter: Meter) -> str:
+def _draw(path: Path, name: str, request: Request, meter: Meter) -> str:
     from ..output.usd.recording import Recording
     from ..pictures.render.paint import Paint, check_field, spanned
 
@@ -171,12 +231,10 @@ def _pictures(
 
 def _counted(pictures: Iterable[np.ndarray], count: int, meter: Meter) -> Iterator[np.ndarray]:
     """The pictures, with a bar on a terminal."""
-    meter.frames = count
-    with bar("render", "frames") as show:
-        for picture in pictures:
+    with meter.count("render") as show:
+        for done, picture in enumerate(pictures, start=1):
             yield picture
-            meter.done += 1
-            show(meter.done, count, "drawing")
+            show(done, count, "drawing")
 
 
 def _chosen(request: Request, there: list[float]) -> list[float]:

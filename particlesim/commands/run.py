@@ -1,18 +1,19 @@
-"""The commands list, run and explain."""
+"""The commands list, run, explain and plot."""
 
 from __future__ import annotations
 
 import ast
 import math
+import shlex
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from ..output.progress import Meter
-from .scene_files import label, load_scene, ready_scenes
+from ..output.progress import label
+from .scene_files import ready_scenes
 from .shell import (
-    DEFAULT_FRAMES,
+    USD,
     Debug,
     Device,
     Frames,
@@ -22,17 +23,58 @@ from .shell import (
     SceneName,
     Substeps,
     Worlds,
-    assigned,
-    given,
-    one_line_errors,
+    load,
+    opened,
     simulation,
-    start_warp_quietly,
+    wanted_frames,
 )
+
+Out = Annotated[
+    Path | None,
+    typer.Option(help="File to write: .usda, .usd, .usdc, .npz, .ply, .gsd or .vtkhdf."),
+]
+Fields = Annotated[
+    list[str] | None,
+    typer.Option("--field", metavar="NAME", help="Write this array too, as density; repeat."),
+]
+Every = Annotated[int, typer.Option(min=1, help="Write each so many-th frame only.")]
+Groups = Annotated[
+    list[str] | None,
+    typer.Option("--group", metavar="NAME", help="Write this group only; repeat. USD."),
+]
+Layout = Annotated[
+    str | None, typer.Option(metavar="grid|X,Y,Z", help="Put worlds side by side. USD.")
+]
+ColorBy = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Colour by this value, as speed. USD.")
+]
+Surface = Annotated[bool, typer.Option("--surface", help="Write fluids as their surface. USD.")]
+Instancer = Annotated[
+    bool, typer.Option("--instancer", help="Write particles as instanced spheres. USD.")
+]
+HistoryFile = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Write energies, momenta and errors, .csv or .jsonl."),
+]
+CheckpointEvery = Annotated[
+    int | None,
+    typer.Option(
+        min=0,
+        metavar="FRAMES",
+        help="Frames between checkpoints, 0 for none. Default: by the clock, below 2 % of it.",
+    ),
+]
+Resume = Annotated[
+    bool, typer.Option("--resume", help="Go on with the run that wrote --out, from its checkpoint.")
+]
+Ledger = Annotated[
+    bool, typer.Option("--ledger", help="Print the work and impulse of every part at the end.")
+]
 
 
 def list_scenes(debug: Debug = False) -> None:
     """List the ready scenes, and whether their answer is known."""
-    with one_line_errors(Meter(), debug):
+    with opened(debug):
         scenes = ready_scenes()
         width = max(map(len, scenes), default=0)
         for name, path in scenes.items():
@@ -47,56 +89,23 @@ def list_scenes(debug: Debug = False) -> None:
 def run(
     scene: SceneName,
     frames: Frames = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="File to write: .usda, .usd, .usdc, .npz, .ply, .gsd or .vtkhdf."),
-    ] = None,
+    out: Out = None,
     options: Options = None,
     device: Device = None,
     worlds: Worlds = None,
     precision: Precision = None,
     substeps: Substeps = None,
-    fields: Annotated[
-        list[str] | None,
-        typer.Option("--field", metavar="NAME", help="Write this array too, as density; repeat."),
-    ] = None,
-    every: Annotated[int, typer.Option(min=1, help="Write each so many-th frame only.")] = 1,
-    groups: Annotated[
-        list[str] | None,
-        typer.Option("--group", metavar="NAME", help="Write this group only; repeat. USD."),
-    ] = None,
-    layout: Annotated[
-        str | None, typer.Option(metavar="grid|X,Y,Z", help="Put worlds side by side. USD.")
-    ] = None,
-    color_by: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Colour by this value, as speed. USD.")
-    ] = None,
-    surface: Annotated[
-        bool, typer.Option("--surface", help="Write fluids as their surface. USD.")
-    ] = False,
-    instancer: Annotated[
-        bool, typer.Option("--instancer", help="Write particles as instanced spheres. USD.")
-    ] = False,
-    history: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write energies, momenta and errors, .csv or .jsonl."),
-    ] = None,
-    checkpoint_every: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            metavar="FRAMES",
-            help="Frames between checkpoints, 0 for none. Default: by the clock, below 2 % of it.",
-        ),
-    ] = None,
-    resume: Annotated[
-        bool,
-        typer.Option("--resume", help="Go on with the run that wrote --out, from its checkpoint."),
-    ] = False,
-    ledger: Annotated[
-        bool,
-        typer.Option("--ledger", help="Print the work and impulse of every part at the end."),
-    ] = False,
+    fields: Fields = None,
+    every: Every = 1,
+    groups: Groups = None,
+    layout: Layout = None,
+    color_by: ColorBy = None,
+    surface: Surface = False,
+    instancer: Instancer = False,
+    history: HistoryFile = None,
+    checkpoint_every: CheckpointEvery = None,
+    resume: Resume = False,
+    ledger: Ledger = False,
     overwrite: Overwrite = False,
     debug: Debug = False,
 ) -> None:
@@ -104,38 +113,53 @@ def run(
 
     Give the same words and --resume to go on with a run that was ended.
     """
-    meter = Meter()
-    with one_line_errors(meter, debug):
+    with opened(debug) as meter:
         _check_output(out, overwrite, resume)
-        if not debug:
-            start_warp_quietly()
-        module = load_scene(scene)
-        assignments = assigned(options, precision, substeps)
-        assignments += ["ledger=True"] if ledger else []
-        sim = simulation(module, assignments, device, worlds)
-        wanted = getattr(module, "frames", DEFAULT_FRAMES) if frames is None else frames
-        drawing = given(
+        module = load(scene, debug)
+        sim = simulation(
+            module, options, device, worlds, precision=precision, substeps=substeps, ledger=ledger
+        )
+        wanted = wanted_frames(module, frames)
+        drawing = _given(
             every=every, groups=groups, layout=_steps(layout), color_by=color_by, surface=surface,
             instancer=instancer,
         )  # fmt: skip
         with meter.measure(label(module), sim, wanted) as progress:
-            record = None if out is None else str(out)
             sim.run(
-                frames=wanted, record=record, progress=progress, overwrite=overwrite,
-                fields=fields or (), history=history, checkpoint=checkpoint_every, resume=resume,
-                **drawing,
+                frames=wanted, record=None if out is None else str(out), progress=progress,
+                overwrite=overwrite, fields=fields or (), history=history,
+                checkpoint=checkpoint_every, resume=resume, **drawing,
             )  # fmt: skip
         if resume and not meter.done:
             typer.echo(f"{label(module)}: all {wanted} frames are in {out}, nothing was left to do")
             return
-        summary = meter.summary()
-        if hasattr(module, "error") and frames is None and worlds is None:
-            error = module.error(sim)
-            if not math.isnan(error):  # nan: nothing is known of this moment
-                summary += f"; error {error:.3g}"
-        typer.echo(summary if out is None else f"{summary}; written to {out}")
+        known = hasattr(module, "error") and frames is None and worlds is None
+        error = module.error(sim) if known else math.nan  # nan: nothing is known of this moment
+        told = [meter.summary(), *([] if math.isnan(error) else [f"error {error:.3g}"])]
+        typer.echo("; ".join([*told, *([] if out is None else [f"written to {out}"])]))
         if ledger:
             typer.echo(str(sim.ledger()))
+        _suggest(out)
+
+
+def _suggest(out: Path | None) -> None:
+    """Say what to do with a recording, to a person."""
+    from rich.console import Console
+
+    if out is None or out.suffix.lower() not in USD or not Console().is_terminal:
+        return
+    file, film = shlex.quote(str(out)), shlex.quote(str(out.with_suffix(".mp4")))
+    typer.echo(f"  film it:     particlesim render {file} --out {film}")
+    typer.echo(f"  look at it:  particlesim view {file}")
+
+
+def _given(**options: Any) -> dict[str, Any]:
+    """The options that were given: not None, False, empty or the one that says all."""
+    return {
+        name: value
+        for name, value in options.items()
+        if value is True or value not in (None, False, 1, [])
+    }
 
 
 def explain(
@@ -151,13 +175,37 @@ def explain(
 
     Arrays, kernels, launches a substep, and bytes a particle.
     """
-    with one_line_errors(Meter(), debug):
-        if not debug:
-            start_warp_quietly()
-        module = load_scene(scene)
-        assignments = assigned(options, precision, substeps)
-        sim = simulation(module, assignments, device, worlds)
+    with opened(debug):
+        sim = simulation(
+            load(scene, debug), options, device, worlds, precision=precision, substeps=substeps
+        )
         typer.echo(str(sim.explain()))
+
+
+def plot(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="What run --history wrote.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Picture, .png, .svg or .pdf. Default: beside the file.")
+    ] = None,
+    what: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,...",
+            help="energy, drift, momentum, angular_momentum, potential, density, residual. "
+            "Default: all there are.",
+        ),
+    ] = None,
+    overwrite: Overwrite = False,
+    debug: Debug = False,
+) -> None:
+    """Draw what a run recorded over time."""
+    with opened(debug):
+        from ..output.history.plots import plot_history
+
+        picture = file.with_suffix(".png") if out is None else out
+        names = [word.strip() for word in what.split(",")] if what else None
+        drawn = plot_history(file, picture, names, overwrite=overwrite)
+        typer.echo(f"{', '.join(drawn)} of {file} drawn in {picture}")
 
 
 def _steps(layout: str | None) -> Any:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import ast
 import contextlib
-import dataclasses
 import importlib
 import importlib.util
 import inspect
@@ -21,6 +20,10 @@ from fractions import Fraction
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+
+from ..output.progress import label
+
+NO_NUMBERS = (str, bytes, tuple, list, dict, set, type(None))  # kinds of literals
 
 
 def ready_scenes() -> dict[str, Path]:
@@ -43,7 +46,7 @@ def load_scene(name: str) -> ModuleType:
     Raises:
         ValueError: No such scene, or a module without ``build`` and ``settings``.
     """
-    import particlesim
+    from ..scene.settings import Settings
 
     if name.endswith(".py") or os.path.basename(name) != name:
         module = _load_file(Path(name))
@@ -56,7 +59,7 @@ def load_scene(name: str) -> ModuleType:
         )
     if not callable(getattr(module, "build", None)):
         raise ValueError(f"{name}: build must be a function that returns a Scene; define it.")
-    if not isinstance(getattr(module, "settings", None), particlesim.Settings):
+    if not isinstance(getattr(module, "settings", None), Settings):
         raise ValueError(f"{name}: settings must be a particlesim.Settings; define it.")
     return module
 
@@ -73,10 +76,6 @@ def _load_file(path: Path) -> ModuleType:
     sys.path.append(str(path.parent.resolve()))
     specification.loader.exec_module(module)
     return module
-
-
-def label(module: ModuleType) -> str:
-    return module.__name__.rpartition(".")[2].removeprefix("scene_")
 
 
 def parse_options(assignments: Sequence[str]) -> dict[str, Any]:
@@ -110,6 +109,40 @@ def _parse_value(text: str) -> Any:
     return text
 
 
+def parse_vary(assignments: Sequence[str]) -> dict[str, list[Any]]:
+    """``["substeps=1,2,5", ...]`` as a dict of lists; a value is what it is in ``--set``.
+
+    Raises:
+        ValueError: No ``=``, no name, no value, or a name given twice.
+    """
+    vary: dict[str, list[Any]] = {}
+    for assignment in assignments:
+        name, equals, text = assignment.partition("=")
+        name = name.strip().replace("-", "_")
+        words = [word.strip() for word in _split_list(text)]
+        if not equals or not name.isidentifier() or not all(words):
+            raise ValueError(
+                f"--vary must be NAME=VALUE,VALUE,..., got {assignment!r}; "
+                "write --vary substeps=1,2,5."
+            )
+        if name in vary:
+            raise ValueError(f"--vary must name a knob once, got {name!r} twice; join the lists.")
+        vary[name] = [_parse_value(word) for word in words]
+    return vary
+
+
+def _split_list(text: str) -> list[str]:
+    """Split at the commas that are outside brackets."""
+    words, depth = [""], 0
+    for sign in text:
+        depth += (sign in "([{") - (sign in ")]}")
+        if sign == "," and depth == 0:
+            words.append("")
+        else:
+            words[-1] += sign
+    return words
+
+
 def split_options(
     module: ModuleType, options: dict[str, Any]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -118,43 +151,14 @@ def split_options(
     A name that is both goes to ``build``.
 
     Raises:
-        ValueError: A name that is neither, text where ``build`` has a number, or an option that
+        ValueError: A name that is neither, no number where ``build`` has one, or an option that
             ``build`` needs and nobody set.
     """
-    from .. import validate
+    from ..accuracy.study import options_of, split
 
-    parameters = inspect.signature(module.build).parameters
-    kinds = {parameter.kind for parameter in parameters.values()}
-    named = {
-        name: parameter
-        for name, parameter in parameters.items()
-        if parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY)
-    }
-    known_knobs = [field.name for field in dataclasses.fields(module.settings)]
-    build_options: dict[str, Any] = {}
-    knobs: dict[str, Any] = {}
-    for name, value in options.items():
-        if name in named:
-            _check_kind(name, value, named[name].default)
-            build_options[name] = value
-        elif name in known_knobs:
-            knobs[name] = value
-        elif inspect.Parameter.VAR_KEYWORD in kinds:
-            build_options[name] = value
-        else:
-            raise ValueError(
-                f"--set must name an option of {label(module)} ({', '.join(named) or 'none'}) "
-                f"or a setting ({', '.join(known_knobs)}), got {name!r}; "
-                f"{validate.suggest(name, [*named, *known_knobs])}."
-            )
-    for name, parameter in named.items():
-        if parameter.default is parameter.empty and name not in build_options:
-            raise ValueError(f"{label(module)}: {name} must be set; give --set {name}=VALUE.")
-    return build_options, knobs
-
-
-def _check_kind(name: str, value: Any, default: Any) -> None:
-    """Refuse text for an option that is a number by default, before it fails somewhere inside."""
-    if isinstance(default, int | float) and not isinstance(value, int | float):
-        kind = "true or false" if isinstance(default, bool) else "a number"
-        raise ValueError(f"--set {name} must be {kind}, got {value!r}; its default is {default!r}.")
+    scene = label(module)
+    chosen, knobs = split(module.build, scene, options, "--set", no_numbers=NO_NUMBERS)
+    for name, default in options_of(module.build).items():
+        if default is inspect.Parameter.empty and name not in chosen:
+            raise ValueError(f"{scene}: {name} must be set; give --set {name}=VALUE.")
+    return chosen, knobs

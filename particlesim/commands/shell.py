@@ -1,4 +1,4 @@
-"""What commands share: their words, one line for whatever goes wrong, and a quiet start."""
+"""What commands share: their words, their opening, and one line for whatever goes wrong."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from typing import Annotated, Any
 
 import typer
 
-from ..output.progress import Meter
-from .scene_files import parse_options, split_options
+from ..output.progress import Meter, announced, label
+from .scene_files import load_scene, parse_options, split_options
 
 DEFAULT_FRAMES = 240
 PACKAGE = os.path.dirname(os.path.dirname(__file__))
+USD = (".usda", ".usd", ".usdc", ".usdz")
 
 SceneName = Annotated[
     str, typer.Argument(metavar="SCENE", help="A ready scene's name, or the path of a scene file.")
@@ -43,45 +44,83 @@ Frames = Annotated[
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace outputs that exist.")]
 Debug = Annotated[bool, typer.Option("--debug", hidden=True, help="Show tracebacks.")]
+Color = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Colour by this value, as density or speed.")
+]
 
 
-def assigned(options: list[str] | None, precision: str | None, substeps: int | None) -> list[str]:
-    """All that is to be set: ``--precision`` and ``--substeps`` are short for a ``--set``."""
-    short = {"precision": precision, "substeps": substeps}
-    return [*(options or []), *(f"{name}={short[name]}" for name in short if short[name])]
+@contextlib.contextmanager
+def opened(debug: bool) -> Iterator[Meter]:
+    """Turn whatever goes wrong into one line and an exit code; yields what counts what is done.
+
+    Before the first frame is done it is the arguments (2), unless the engine says that it failed:
+    a RuntimeError or no memory (1). After that it is the run (1).
+    """
+    meter = Meter()
+    try:
+        yield meter
+    except (typer.Exit, typer.TyperException):
+        raise
+    except BrokenPipeError:
+        # Who reads has what they wanted, as head does. Nothing may be left to flush at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise typer.Exit(0) from None
+    except KeyboardInterrupt:
+        complain(f"interrupted after {meter.done} of {meter.frames} {meter.unit}")
+        raise typer.Exit(130) from None
+    except Exception as error:
+        if debug:
+            traceback.print_exc()
+        complain(describe(error))
+        failed = meter.done > 0 or isinstance(error, RuntimeError | MemoryError)
+        raise typer.Exit(1 if failed else 2) from None
 
 
-def given(**options: Any) -> dict[str, Any]:
-    """The options that were given: not None, False, empty or the one that says all."""
-    return {
-        name: value
-        for name, value in options.items()
-        if value is True or value not in (None, False, 1, [])
-    }
+def load(name: str, debug: bool) -> ModuleType:
+    """The module of a scene; Warp is started for it."""
+    with announced(f"{name}: loading"):
+        start_warp(debug)
+        return load_scene(name)
 
 
 def simulation(
     module: ModuleType,
-    assignments: list[str],
+    options: list[str] | None,
     device: str | None,
     worlds: int | None,
+    **short: Any,
 ) -> Any:
-    """The scene with its options and settings, on a device."""
-    import particlesim
+    """The scene with its options and settings, on a device.
 
-    options, knobs = split_options(module, parse_options(assignments))
+    ``short``: knobs with an option of their own, which is short for a ``--set``.
+    """
+    from ..simulation.simulation import Simulation
+
+    assignments = [f"{name}={value}" for name, value in short.items() if value]
+    chosen, knobs = split_options(module, parse_options([*(options or []), *assignments]))
     settings = module.settings.replace(**knobs)
-    scene = module.build(**options)
-    return particlesim.Simulation(scene, settings, device=device, worlds=worlds)
+    with announced(f"{label(module)}: building"):
+        scene = module.build(**chosen)
+    count = getattr(scene, "particle_count", 0) * (worlds or 1)
+    with announced(f"{label(module)}: preparing {count:,} particles"):
+        return Simulation(scene, settings, device=device, worlds=worlds)
 
 
-def start_warp_quietly() -> None:
+def wanted_frames(module: ModuleType, frames: int | None) -> int:
+    """How many frames to run: as asked for, or the scene's own."""
+    return getattr(module, "frames", DEFAULT_FRAMES) if frames is None else frames
+
+
+def start_warp(debug: bool) -> None:
     """Start Warp, without a line for each module it loads and one for CUDA that is not there.
 
     The latter is printed by its C code past every log level, so it is taken out of the stream.
+    ``debug``: let it say what it says.
     """
     import warp
 
+    if debug:
+        return
     warp.config.log_level = warp.LOG_WARNING
     stream = os.dup(2)
     with tempfile.TemporaryFile() as printed:
@@ -95,32 +134,6 @@ def start_warp_quietly() -> None:
         for line in printed.read().decode(errors="replace").splitlines():
             if "Could not find or load the NVIDIA CUDA driver" not in line:
                 typer.echo(line, err=True)
-
-
-@contextlib.contextmanager
-def one_line_errors(meter: Meter, debug: bool) -> Iterator[None]:
-    """Turn whatever goes wrong into one line and an exit code.
-
-    Before the first frame is done it is the arguments (2), unless the engine says that it failed:
-    a RuntimeError or no memory (1). After that it is the run (1).
-    """
-    try:
-        yield
-    except (typer.Exit, typer.TyperException):
-        raise
-    except BrokenPipeError:
-        # Who reads has what they wanted, as head does. Nothing may be left to flush at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        raise typer.Exit(0) from None
-    except KeyboardInterrupt:
-        complain(f"interrupted after {meter.done} of {meter.frames} frames")
-        raise typer.Exit(130) from None
-    except Exception as error:
-        if debug:
-            traceback.print_exc()
-        complain(describe(error))
-        failed = meter.done > 0 or isinstance(error, RuntimeError | MemoryError)
-        raise typer.Exit(1 if failed else 2) from None
 
 
 def describe(error: Exception) -> str:

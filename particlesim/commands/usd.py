@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..output.progress import Meter
-from .shell import Debug, Overwrite, one_line_errors
+from .shell import Debug, Overwrite, opened
 
 usd = typer.Typer(help="Look into USD files, check them, and pack them.", rich_markup_mode=None)
 UsdFile = Annotated[Path, typer.Argument(metavar="FILE", help="A recording, or any USD file.")]
@@ -17,10 +16,10 @@ UsdFile = Annotated[Path, typer.Argument(metavar="FILE", help="A recording, or a
 @usd.command()
 def info(file: UsdFile, debug: Debug = False) -> None:
     """Show what is inside: the stage, its frames, what is drawn, and bytes."""
-    with one_line_errors(Meter(), debug):
-        from . import usd_files as command
+    with opened(debug):
+        from ..output.usd.info import info as described
 
-        typer.echo(command.show(file))
+        typer.echo(str(described(file)))
 
 
 @usd.command()
@@ -29,12 +28,12 @@ def check(file: UsdFile, debug: Debug = False) -> None:
 
     Exit code 1: there are some.
     """
-    with one_line_errors(Meter(), debug):
-        from . import usd_files as command
+    with opened(debug):
+        from ..output.usd.checking.check import check as faults
 
-        found = command.complaints(file)
-        for line in found:
-            typer.echo(line)
+        found = faults(file)
+        for fault in found:
+            typer.echo(str(fault))
         if found:
             raise typer.Exit(1)
         typer.echo(f"{file}: no faults")
@@ -48,7 +47,9 @@ def pack(
     debug: Debug = False,
 ) -> None:
     """Put a recording's frames into one file."""
-    with one_line_errors(Meter(), debug):
-        from . import usd_files as command
+    with opened(debug):
+        from ..output.usd.pack import pack as packed
 
-        typer.echo(command.packed(file, out, overwrite))
+        frames = packed(file, out, overwrite=overwrite)
+        size = out.stat().st_size
+        typer.echo(f"{frames} frames of {file} written to {out}, {size:,} bytes")

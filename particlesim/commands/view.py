@@ -1,4 +1,4 @@
-"""The command ``particlesim view``: a page in the browser, until it is interrupted."""
+"""The command view: a page in the browser, until it is interrupted."""
 
 from __future__ import annotations
 
@@ -10,25 +10,64 @@ import threading
 import webbrowser
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from .. import validate
-from ..pictures.view.footage import Footage
-from ..pictures.view.live import Live
-from ..pictures.view.server import Server
-from .render import USD
+from .shell import (
+    USD,
+    Color,
+    Debug,
+    Device,
+    Frames,
+    Options,
+    Precision,
+    Substeps,
+    Worlds,
+    load,
+    opened,
+    simulation,
+    wanted_frames,
+)
 
 OWNER = "view"
 PORTS = 65535
 
 
 def view(
-    name: str,
-    port: int,
-    browser: bool,
-    color: str | None,
-    simulate: Callable[[], tuple[Any, int]],
-    say: Callable[[str], None],
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="A recording, any USD file, or a scene to run.")
+    ],
+    port: Annotated[int, typer.Option(help="Port of the page. Default: any that is free.")] = 0,
+    browser: Annotated[bool, typer.Option(help="Open a browser, or only say where.")] = True,
+    color: Color = None,
+    frames: Frames = None,
+    options: Options = None,
+    device: Device = None,
+    worlds: Worlds = None,
+    precision: Precision = None,
+    substeps: Substeps = None,
+    debug: Debug = False,
+) -> None:
+    """Show a recording in the browser, or run a scene there.
+
+    The page is on this computer only.
+    """
+    with opened(debug):
+
+        def simulate() -> tuple[Any, int]:
+            module = load(file, debug)
+            sim = simulation(
+                module, options, device, worlds, precision=precision, substeps=substeps
+            )
+            return sim, wanted_frames(module, frames)
+
+        _show(file, port, browser, color, simulate)
+
+
+def _show(
+    name: str, port: int, browser: bool, color: str | None, simulate: Callable[[], tuple[Any, int]]
 ) -> None:
     """Show a file or a scene until interrupted.
 
@@ -38,8 +77,10 @@ def view(
         browser: Open a browser, where there is a display for one.
         color: Name of a value to colour by, or None.
         simulate: Makes the simulation, where ``name`` is a scene, and says how many frames to run.
-        say: Takes lines for the terminal.
     """
+    from ..pictures.view.live import Live
+    from ..pictures.view.server import Server
+
     if validate.whole(OWNER, "port", port) > PORTS:
         raise validate.fail(OWNER, "port", f"be at most {PORTS}", port, "choose a smaller one")
     with contextlib.ExitStack() as stack:
@@ -49,15 +90,17 @@ def view(
         if isinstance(source, Live):
             stack.callback(source.close)
         server = stack.enter_context(Server(source, port, color))
-        say(f"{name} is shown at {server.url} until you press Ctrl+C")
+        typer.echo(f"{name} is shown at {server.url} until you press Ctrl+C")
         if browser and _has_display():
             webbrowser.open(server.url)
         threading.Event().wait()
 
 
-def _source(
-    name: str, color: str | None, simulate: Callable[[], tuple[Any, int]]
-) -> Footage | Live:
+def _source(name: str, color: str | None, simulate: Callable[[], tuple[Any, int]]) -> Any:
+    """What is shown: a recording, or a simulation that runs."""
+    from ..pictures.view.footage import Footage
+    from ..pictures.view.live import Live
+
     if Path(name).suffix.lower() in USD:
         footage = Footage(Path(name))
         if color is not None:

@@ -1,17 +1,1 @@
 """Constraints: what projects positions after integration."""
-
-from .boundary import BoxBoundary, PlaneBoundary, SphereBoundary
-from .constraint import Constraint
-from .contact import Contact
-from .distance import Distance
-from .force import ConstraintForce
-
-__all__ = [
-    "BoxBoundary",
-    "Constraint",
-    "ConstraintForce",
-    "Contact",
-    "Distance",
-    "PlaneBoundary",
-    "SphereBoundary",
-]

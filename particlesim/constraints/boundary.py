@@ -1,4 +1,4 @@
-"""Boundaries that hold particles off by their radius: planes, boxes and spheres."""
+"""Boundaries: what holds particles off by their radius, from one law, its signed distance."""
 
 from __future__ import annotations
 
@@ -6,237 +6,256 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import warp as wp
 
 from .. import validate
 from ..engine.model import Model
-from ..engine.probing.limit import Limit
-from ..engine.probing.probe import Probe
-from ..kernels.constraints import boundary_shapes
-from .boundary_base import STILL, Boundary
-from .limits import box_limits, sphere_limits
+from ..interactions.arguments import Arguments
+from ..kernels.constraints import boundary_shapes as kernels
+from ..kernels.precision import FLOAT64, Precision, structure
+from ..scene.law import Law
+from ..scene.law import law as make_law
+from .holding import Holding
+
+STILL = (0.0, 0.0, 0.0)
+CELLS = 64  # along the longest side of what is drawn
+PLACES = 4096  # at which a law is asked for its period
+# Arguments of every boundary.
+OWN = frozenset(
+    {"law", "friction", "restitution", "group", "velocity", "angular_velocity", "pivot", "drawn"}
+)
 
 
-class PlaneBoundary(Boundary):
-    """The half space (x - point) . n >= R, on the side that the normal points to.
+class Boundary(Holding):
+    """What holds particles off by their radius, d(x) >= R, from one law: its signed distance d.
 
-    Args:
-        point: A point of the plane [length], (3,); it turns about this one.
-        normal: n, into the half space that is open to particles, (3,); any length but 0.
-        friction: mu, at least 0.
-        restitution: e, 0 to 1: speed after over speed before, both against the plane's.
-        group: Which particles it holds; None: all.
-        velocity: Of the plane, (3,) [length/time]: along the normal a piston, across it a
-            conveyor belt, which stays where it is.
-        angular_velocity: About the point, (3,) [rad/time]: along the normal a turntable.
+    Particles are held with nothing to soften it. Friction takes back the tangential way of the
+    substep against the surface, up to mu times the normal correction (Macklin et al. 2014, eq. 24);
+    restitution sets the normal velocity against the surface's after the solve (Mueller et al. 2020,
+    eq. 34). What starts outside is brought in at no more than ``Settings.depenetration_speed``.
 
-    Raises:
-        ValueError: Values out of range; a normal along a periodic axis.
+    The normal is the law's gradient, derived. Where that has another length than 1, the law is no
+    distance, and the way along its gradient to where it is 0 counts: d / |grad d| to first order.
+    On a place without a gradient, as the axis of a cylinder, that of a place next to it does. What
+    goes through in one substep is not seen.
 
-    Example:
-        >>> ground = PlaneBoundary((0, 0, 0), (0, 2, 0), friction=0.5)
-        >>> ground.normal.tolist()
-        [0.0, 1.0, 0.0]
-        >>> piston = PlaneBoundary((0, 0, 0), (0, 1, 0), velocity=(0, 0.5, 0))
-        >>> piston.pose(time=2.0)[0].tolist()
-        [0.0, 1.0, 0.0]
-    """
+    A boundary moves as a rigid body from where it is described, by its world's clock: place and
+    turn at time t are exact, however many substeps led there.
 
-    shape = boundary_shapes.PLANE
-    geometry = ("point", "normal")
-
-    def __init__(
-        self,
-        point: Sequence[float],
-        normal: Sequence[float],
-        friction: float = 0.0,
-        restitution: float = 0.0,
-        group: Any = None,
-        *,
-        velocity: Sequence[float] = STILL,
-        angular_velocity: Sequence[float] = STILL,
-    ):
-        super().__init__(friction, restitution, group, velocity, angular_velocity)
-        self.point = validate.vector(self.name, "point", point, unit="length")
-        given = validate.vector(self.name, "normal", normal)
-        longest = np.abs(given).max()
-        if not longest > 0:
-            raise validate.fail(
-                self.name, "normal", "have a direction", given, "point it to where particles are"
-            )
-        scaled = given / longest  # so that squares neither overflow nor vanish
-        self.normal = scaled / np.linalg.norm(scaled)
-
-    def shapes(self) -> list[dict[str, Any]]:
-        return [self._drawn("plane", point=self.point, normal=self.normal)]
-
-    def _pivot(self) -> np.ndarray:
-        return self.point
-
-    def _carried(self) -> tuple[np.ndarray, np.ndarray]:
-        n = self.normal
-        if np.cross(n, self.angular_velocity).any():
-            return self.velocity, self.angular_velocity
-        return n * (n @ self.velocity), np.zeros(3)
-
-    def _check(self, model: Model, w: int) -> None:
-        turn = self._carried()[1]
-        aside = np.cross(turn, self.normal)
-        swept = np.array([self.normal, aside, np.cross(turn, aside)])  # the normals that it takes
-        if swept[:, list(model.periodic)].any():
-            raise validate.fail(
-                self.name, "normal", "be along the open axes of a periodic scene", self.normal,
-                "leave that axis open",
-            )  # fmt: skip
-
-
-class BoxBoundary(Boundary):
-    """The inside of a box: lower + R <= x <= upper - R on each axis.
+    ``PlaneBoundary``, ``BoxBoundary`` and ``SphereBoundary`` are boundaries whose surface is
+    written out, so that they are exact where rounding or a lack of room would tell.
 
     Args:
-        lower: Lower corner [length], (3,); -inf leaves a side open.
-        upper: Upper corner [length], (3,), above the lower; inf leaves a side open.
-        friction: mu of all sides, at least 0.
-        restitution: e, 0 to 1: speed after over speed before, both against the side's.
-        group: Which particles it holds; None: all.
-        velocity: Of the box, (3,) [length/time].
-        angular_velocity: About its middle, (3,) [rad/time]; only of a box without open sides.
-
-    Raises:
-        ValueError: Values out of range; a side on a periodic axis; an open box that turns.
-
-    Example:
-        >>> pool = BoxBoundary((0, 0, 0), (4, float("inf"), 1))
-        >>> pool.upper.tolist()
-        [4.0, inf, 1.0]
-        >>> mill = BoxBoundary((-1, -1, -1), (1, 1, 1), friction=0.5, angular_velocity=(0, 0, 2))
-        >>> mill.pose(time=np.pi / 4)[1].round(6).tolist()
-        [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
-    """
-
-    shape = boundary_shapes.BOX
-    geometry = ("lower", "upper")
-
-    def __init__(
-        self,
-        lower: Sequence[float],
-        upper: Sequence[float],
-        friction: float = 0.0,
-        restitution: float = 0.0,
-        group: Any = None,
-        *,
-        velocity: Sequence[float] = STILL,
-        angular_velocity: Sequence[float] = STILL,
-    ):
-        super().__init__(friction, restitution, group, velocity, angular_velocity)
-        self.lower = self._corner("lower", lower, -np.inf)
-        self.upper = self._corner("upper", upper, np.inf)
-        if not (self.lower < self.upper).all():
-            raise validate.fail(
-                self.name, "upper", f"be above lower {self.lower.tolist()} [length]", self.upper,
-                "swap the corners",
-            )  # fmt: skip
-        closed = np.isfinite(self.lower) & np.isfinite(self.upper)
-        if self.angular_velocity.any() and not closed.all():
-            raise validate.fail(
-                self.name, "angular_velocity", "be 0 where sides are open, as there is no middle",
-                self.angular_velocity, "close the box, or turn planes",
-            )  # fmt: skip
-
-    def _corner(self, name: str, value: Any, open_side: float) -> np.ndarray:
-        sides = np.asarray(value, dtype=np.float64) if np.shape(value) == (3,) else None
-        opened = np.zeros(3, dtype=bool) if sides is None else sides == open_side
-        # The open sides are the only values that may be infinite.
-        finite = value if sides is None else np.where(opened, 0.0, sides)
-        corner = validate.vector(self.name, name, finite, unit="length")
-        return np.where(opened, open_side, corner)
-
-    def shapes(self) -> list[dict[str, Any]]:
-        return [self._drawn("box", lower=self.lower, upper=self.upper)]
-
-    def limits(self, probe: Probe) -> list[Limit]:
-        """By the speed of the particles against the width; half spaces are never passed through."""
-        return box_limits(self, probe)
-
-    def _pivot(self) -> np.ndarray:
-        middle = 0.5 * self.lower + 0.5 * self.upper
-        return middle if self.angular_velocity.any() else np.zeros(3)
-
-    def _carried(self) -> tuple[np.ndarray, np.ndarray]:
-        # Along an axis without sides it moves in itself.
-        sided = np.isfinite(self.lower) | np.isfinite(self.upper)
-        return np.where(sided, self.velocity, 0.0), self.angular_velocity
-
-    def _check(self, model: Model, w: int) -> None:
-        for axis, on in enumerate(model.periodic):
-            if on and (np.isfinite(self.lower[axis]) or np.isfinite(self.upper[axis])):
-                raise validate.fail(
-                    self.name, f"sides along {'xyz'[axis]}", "be open where the scene is periodic",
-                    [float(self.lower[axis]), float(self.upper[axis])], "use -inf and inf",
-                )  # fmt: skip
-
-
-class SphereBoundary(Boundary):
-    """The inside of a sphere, |x - center| <= radius - R, or its outside, >= radius + R.
-
-    From the outside, what crosses the middle of the sphere in one substep leaves on the other side.
-
-    Args:
-        center: Middle of the sphere [length], (3,).
-        radius: Of the sphere [length], above 0.
-        inside: True: a container; False: an obstacle.
+        law: ``d(x, ...)`` [length], positive where particles may be: the first parameter is the
+            place, ``wp.vec3``, the others are given by keyword.
         friction: mu, at least 0.
         restitution: e, 0 to 1: speed after over speed before, both against the surface's.
         group: Which particles it holds; None: all.
-        velocity: Of the sphere, (3,) [length/time].
-        angular_velocity: About the center, (3,) [rad/time].
+        velocity: Of the boundary, (3,) [length/time].
+        angular_velocity: About the pivot, (3,) [rad/time].
+        pivot: What it turns about, as described, (3,) [length].
+        drawn: ``(lower, upper)`` corners [length] of the box in which recordings draw the surface,
+            as described; None: it is not drawn.
+        **parameters: The law's further parameters: a number each, or (3,) where the law takes a
+            ``wp.vec3``.
 
     Raises:
-        ValueError: Values out of range; a periodic scene.
+        ValueError: Values out of range; a law that takes no place or cannot be derived; a parameter
+            that is missing; in a periodic scene a law of another period, or one that turns.
+        TypeError: A parameter that the law does not have.
 
     Example:
-        >>> bowl = SphereBoundary((0, 1, 0), 1.0, friction=0.1)
-        >>> ball = SphereBoundary((0, 0, 0), 0.2, inside=False, velocity=(1, 0, 0))
-        >>> ball.pose(time=3.0)[0].tolist()
-        [3.0, 0.0, 0.0]
+        >>> @law
+        ... def torus(x: wp.vec3, ring: float, tube: float):
+        ...     return wp.length(wp.vec2(wp.length(wp.vec2(x[0], x[2])) - ring, x[1])) - tube
+        >>> wheel = Boundary(torus, friction=0.3, angular_velocity=(1, 0, 0), ring=1.0, tube=0.2)
+        >>> wheel.distance([(0, 0, 0), (1, 0.3, 0)]).round(6).tolist()
+        [0.8, 0.1]
     """
 
-    shape = boundary_shapes.SPHERE
-    geometry = ("center", "radius", "inside")
+    law: Law  # of the class, where that has a surface of its own
 
     def __init__(
         self,
-        center: Sequence[float],
-        radius: float,
-        inside: bool = True,
+        law: Any,
         friction: float = 0.0,
         restitution: float = 0.0,
         group: Any = None,
         *,
         velocity: Sequence[float] = STILL,
         angular_velocity: Sequence[float] = STILL,
+        pivot: Sequence[float] = STILL,
+        drawn: tuple[Sequence[float], Sequence[float]] | None = None,
+        **parameters: Any,
     ):
-        super().__init__(friction, restitution, group, velocity, angular_velocity)
-        self.center = validate.vector(self.name, "center", center, unit="length")
-        self.radius = validate.number(self.name, "radius", radius, above=0.0, unit="length")
-        self.inside = bool(inside)
+        self._holds(friction, restitution, group, velocity, angular_velocity)
+        self.pivot = validate.vector(self.name, "pivot", pivot, unit="length")
+        self.law = make_law(law)
+        self.law.check_derivable(self.name)
+        self.parameters = self._values(parameters)
+        self._box = None if drawn is None else self._corners(drawn)
+
+    def _holds(
+        self,
+        friction: float,
+        restitution: float,
+        group: Any,
+        velocity: Sequence[float],
+        angular_velocity: Sequence[float],
+    ) -> None:
+        """What boundaries of every surface are made with."""
+        self.group = group
+        self.friction = validate.number(self.name, "friction", friction, minimum=0.0)
+        self.restitution = validate.number(
+            self.name, "restitution", restitution, minimum=0.0, maximum=1.0
+        )
+        self.velocity = validate.vector(self.name, "velocity", velocity, unit="length/time")
+        self.angular_velocity = validate.vector(
+            self.name, "angular_velocity", angular_velocity, unit="rad/time"
+        )
+
+    def _values(self, given: dict[str, Any]) -> dict[str, Any]:
+        """The law's further parameters."""
+        names = list(self.law.parameters)
+        if not names or self.law.parameters[names[0]] is not wp.vec3:
+            raise validate.fail(
+                self.name, "law", "take a place (wp.vec3) first", self.law.name,
+                "write def law(x: wp.vec3, ...)",
+            )  # fmt: skip
+        for name in OWN & {*names[1:]}:
+            raise validate.fail(
+                self.name, f"parameter {name} of {self.law.name}", "have a name of its own", name,
+                "rename it",
+            )  # fmt: skip
+        values = Arguments(self.name, self.law, 1, given, ()).values
+        for name, value in values.items():
+            check = validate.vector if self.law.parameters[name] is wp.vec3 else validate.number
+            check(self.name, name, value)
+        return values
+
+    def _corners(self, drawn: Any) -> tuple[np.ndarray, np.ndarray]:
+        if not isinstance(drawn, Sequence | np.ndarray) or len(drawn) != 2:
+            raise validate.fail(
+                self.name, "drawn", "be two corners [length]", drawn, "give (lower, upper)"
+            )
+        lower, upper = (validate.vector(self.name, "drawn", each, unit="length") for each in drawn)
+        if not (lower < upper).all():
+            raise validate.fail(
+                self.name, "drawn", f"have its upper corner above {lower.tolist()} [length]", upper,
+                "swap the corners",
+            )  # fmt: skip
+        return lower, upper
+
+    def kind(self) -> tuple[Any, ...]:
+        given = (self.law.key, tuple(self.parameters)) if "law" in vars(self) else ()
+        return (type(self), *given)
+
+    def distance(self, points: Any) -> np.ndarray:
+        """The law at points (n, 3) [length] of the boundary as described, that is at time 0.
+
+        Returns:
+            (n,) [length], positive where particles may be.
+        """
+        x = validate.rows(f"{self.name}.distance", "points", points, None, 3)
+        values = self._geometry()
+        kinds = {
+            name: {wp.vec3: wp.vec3d, int: wp.int32}.get(self.law.parameters[name], wp.float64)
+            for name in values
+        }
+        Params = structure("DistanceParameters", kinds)
+        given = Params()
+        for name, value in values.items():
+            setattr(given, name, kinds[name](value))
+        kernel = kernels.distance_kernel(self.law.function(FLOAT64), tuple(kinds), Params)
+        found = wp.empty(len(x), dtype=wp.float64, device="cpu")
+        places = wp.array(x, dtype=wp.vec3d, device="cpu")
+        wp.launch(kernel, len(x), [given, places], [found], device="cpu")
+        return found.numpy()
+
+    @property
+    def moves(self) -> bool:
+        """Its surface has a velocity."""
+        return bool(self.velocity.any() or self.angular_velocity.any())
+
+    def pose(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Where it is: what is at x as described is at R x + T at ``time``.
+
+        Args:
+            time: Of its world, since the start [time].
+
+        Returns:
+            T, (3,) [length], and R, (3, 3). What moves the shape in itself, as a plane along
+            itself or a sphere about its center, is left out.
+        """
+        travel, turn = self._carried()
+        angle = float(np.linalg.norm(turn)) * time
+        rotation = np.eye(3)
+        if angle != 0.0:
+            cross = np.cross(np.eye(3), turn / np.linalg.norm(turn))
+            rotation += np.sin(angle) * cross + 2 * np.sin(angle / 2) ** 2 * cross @ cross
+        pivot = self._pivot()
+        return travel * time + pivot - rotation @ pivot, rotation
 
     def shapes(self) -> list[dict[str, Any]]:
-        ball = {"center": self.center, "radius": self.radius, "container": self.inside}
-        return [self._drawn("sphere", **ball)]
+        """Its surface in the box that is drawn, clear where it closes in the particles."""
+        from warp.geometry import IsoSurfaceMarchingCubes
 
-    def limits(self, probe: Probe) -> list[Limit]:
-        """By the speed of the particles against the radius."""
-        return sphere_limits(self, probe)
+        if self._box is None:
+            return []
+        lower, upper = self._box
+        nodes = 1 + np.ceil(CELLS * (upper - lower) / (upper - lower).max()).astype(int)
+        axes = [np.linspace(*ends) for ends in zip(lower, upper, nodes, strict=True)]
+        d = self.distance(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3))
+        d = d.reshape(nodes)
+        field = wp.array(d, dtype=wp.float32, device="cpu")
+        points, corners = IsoSurfaceMarchingCubes.extract(field, lower=lower, upper=upper)
+        triangles = corners.numpy().reshape(-1, 3)
+        inside = bool(d[np.ix_([0, -1], [0, -1], [0, -1])].max() < 0)
+        mesh = {"points": points.numpy(), "triangles": triangles, "container": inside}
+        return [self._shape("mesh", **mesh)] if len(triangles) else []
+
+    def _shape(self, kind: str, **parameters: Any) -> dict[str, Any]:
+        """A shape for recordings, which ask a moving one for its pose."""
+        moving = any(each.any() for each in self._carried())
+        return {"kind": kind, "moving": moving, **parameters}
 
     def _pivot(self) -> np.ndarray:
-        return self.center
+        """What it turns about, as described."""
+        return self.pivot
 
     def _carried(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.velocity, np.zeros(3)
+        """Velocity and angular velocity, less what moves the shape in itself."""
+        return self.velocity, self.angular_velocity
+
+    def _geometry(self) -> dict[str, Any]:
+        """What the surface takes, by name."""
+        return self.parameters
 
     def _check(self, model: Model, w: int) -> None:
-        if any(model.periodic):
+        """The shape is fit for world w: along a periodic axis, one period on it is the same."""
+        axes = np.flatnonzero(model.periodic)
+        if not len(axes) or not model.scenes[w].particle_count:
+            return
+        if self.angular_velocity.any():
             raise validate.fail(
-                self.name, "scene", "be open along all axes", list(model.periodic),
-                "leave periodic out",
+                self.name, "angular_velocity", "be 0 in a periodic scene", self.angular_velocity,
+                "leave it out",
             )  # fmt: skip
+        x, length = model.scenes[w].position, model.box_length[w]
+        lower = np.where(model.periodic, model.box_lower[w], x.min(axis=0) - length.max())
+        upper = np.where(model.periodic, lower + length, x.max(axis=0) + length.max())
+        points = np.random.default_rng(0).uniform(lower, upper, (PLACES, 3))
+        d = self.distance(points)
+        for axis in axes:
+            gap = np.abs(self.distance(points + length * np.eye(3)[axis]) - d).max()
+            if not gap <= 1e-6 * length[axis]:
+                raise validate.fail(
+                    self.name, f"law {self.law.name}",
+                    f"be the same one period on, {length[axis]:g} along {'xyz'[axis]} [length]",
+                    f"a difference of {gap:g}", "give it that period, or leave the axis open",
+                )  # fmt: skip
+
+    def surface(self, precision: Precision) -> wp.Function:
+        """Where it is, as a Warp function (see kernels.constraints.boundary_shapes)."""
+        law, names = self.law.function(precision), tuple(self.parameters)
+        return kernels.distance_function(law, names, precision, self.Params)

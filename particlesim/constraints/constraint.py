@@ -189,19 +189,15 @@ class Constraint(ConstraintBase):
     def attach(self, model: Model, state: State) -> None:
         if not self.count:
             return
-        tuples, precision = self.tuples, model.precision
-        self.struct = tuples.struct(
+        self.struct = self.tuples.struct(
             inequality=self.inequality, breakable=self.break_force is not None
         )
         self.bodies = bodies(model, state)
-        self.scale = wp.zeros(1, dtype=precision.scalar, device=model.device)
+        self.scale = wp.zeros(1, dtype=model.precision.scalar, device=model.device)
         self.strain = wp.zeros_like(self.struct.lam)
-        shape = (
-            self.evaluation(model, tuples.Item), precision, model.periodic,
-            "position_error" in state, tuples.size, tuples.Item, self.relative,
-        )  # fmt: skip
-        self.project_kernel = kernels.project_kernel(*shape, self.unit)
-        self.strain_kernel = kernels.strain_kernel(*shape)
+        solved = self.tuples.solved(self, state)
+        self.project_kernel = kernels.project_kernel(solved)
+        self.strain_kernel = kernels.strain_kernel(solved)
 
     def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if self.count and dt > 0:

@@ -77,10 +77,9 @@ class ConstraintForce(Interaction):
         self.seats = kernels.Seats()
         for name, column in self.rows.items():
             setattr(self.seats, name, model.array(column.astype(np.int32), wp.int32))
-        self.force_kernel, self.measure_kernel = kernels.force_kernels(
-            constraint.evaluation(model, tuples.Item), model.precision, model.periodic,
-            "position_error" in state, tuples.size, tuples.Item, constraint.relative,
-        )  # fmt: skip
+        solved = tuples.solved(constraint, state)
+        self.force_kernel = kernels.force_kernel(solved)
+        self.measure_kernel = kernels.measure_kernel(solved)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if self.count:

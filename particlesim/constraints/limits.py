@@ -35,26 +35,10 @@ def contact_limits(part: Any, probe: Probe) -> list[Limit]:
     return [Limit(part.name, "speed", float(dt[k]), reason, *probe.place(int(rows[k])))]
 
 
-def box_limits(part: Any, probe: Probe) -> list[Limit]:
-    """No particle may cross the box in a substep: |v| dt <= upper - lower, along each axis."""
-
-    names = [f"width / v along {axis}" for axis in "xyz"]
-    return _crossing(part, probe, names, lambda box, v: (box.upper - box.lower) / np.abs(v))
-
-
-def sphere_limits(part: Any, probe: Probe) -> list[Limit]:
-    """No particle may pass the middle of an obstacle, or cross a container: |v| dt <= radius."""
-
-    return _crossing(
-        part, probe, ["radius / v"],
-        lambda ball, v: ball.radius / np.linalg.norm(v, axis=1, keepdims=True),
-    )  # fmt: skip
-
-
-def _crossing(
+def crossing_limits(
     part: Any, probe: Probe, names: list[str], times: Callable[[Any, np.ndarray], np.ndarray]
 ) -> list[Limit]:
-    """The shortest time that any particle takes, at its velocity against the boundary's.
+    """The shortest time that any particle takes to cross, at its velocity against the boundary's.
 
     Args:
         part: The boundary of all worlds.

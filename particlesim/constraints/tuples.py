@@ -11,7 +11,7 @@ import warp as wp
 from ..engine import topology
 from ..engine.model import Model
 from ..engine.state import State
-from ..kernels.constraints.constraints import bodies_type, tuples_type
+from ..kernels.constraints.constraints import Solved, bodies_type, tuples_type
 
 
 class Tuples:
@@ -54,6 +54,14 @@ class Tuples:
             result.broken = wp.zeros(self.count, dtype=wp.int32, device=model.device)
         result.one_sided, result.breakable = int(inequality), int(breakable)
         return result
+
+    def solved(self, constraint: Any, state: State) -> Solved:
+        """What the kernels of a constraint, or of the force it makes, are made for."""
+        model = self.model
+        return Solved(
+            constraint.evaluation(model, self.Item), model.precision, model.periodic,
+            "position_error" in state, self.size, self.Item, constraint.relative, constraint.unit,
+        )  # fmt: skip
 
     def seats(self) -> dict[str, np.ndarray]:
         """The tuples of every particle that is in one (see kernels.constraint_force)."""

@@ -13,7 +13,6 @@ from .. import validate
 from ..scene.part import ConstraintBase, Interaction, Part
 from ..scene.scene import Scene
 from ..scene.settings import Settings
-from . import batch
 from .execution.launch import owner
 from .integrators import method
 from .model import Model
@@ -41,8 +40,8 @@ class Loop:
         self.model = model = Model(scenes, settings, device)
         self.frame = 0
         # What is prepared allocates only what it requires.
-        self.interactions: list[Interaction] = batch.bound([each.interactions for each in scenes])
-        self.constraints: list[ConstraintBase] = batch.bound([each.constraints for each in scenes])
+        self.interactions: list[Interaction] = _bound([each.interactions for each in scenes])
+        self.constraints: list[ConstraintBase] = _bound([each.constraints for each in scenes])
         self.state, self.neighbors = State(model), Neighbors(model)
         for part in self.parts:
             part.prepare(model, self.neighbors)
@@ -157,3 +156,8 @@ class Loop:
     def get(self, name: str) -> np.ndarray:
         """A per-particle array, copied to the host."""
         return self.state[name].numpy().copy()
+
+
+def _bound(parts: Sequence[Sequence[Any]]) -> list[Any]:
+    """One part for all worlds, from the corresponding ones of the scenes."""
+    return [peers[0].bind(peers) for peers in zip(*parts, strict=True)]

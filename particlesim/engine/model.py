@@ -10,11 +10,11 @@ import warp as wp
 
 from .. import validate
 from ..kernels.engine.loops import Periodicity, box_type
-from ..kernels.precision import PRECISIONS
+from ..kernels.precision import PRECISIONS, structure
+from ..kernels.self_check import fast_ways
 from ..scene.group import select
 from ..scene.scene import Scene
 from ..scene.settings import Settings
-from .structs import parameter_struct
 
 
 def choose_device(device: Any) -> Any:
@@ -29,6 +29,41 @@ def choose_device(device: Any) -> Any:
     raise validate.fail(
         "Simulation", "device", f"be one of {', '.join(there)}", str(device), "choose one"
     )
+
+
+def batch(given: Any, worlds: int | None) -> list[Scene]:
+    """The scenes of a batch, checked to be of one kind."""
+    owner = "Simulation"
+    if isinstance(given, Scene):
+        count = 1 if worlds is None else validate.whole(owner, "worlds", worlds, minimum=1)
+        return [given] * count
+    if not isinstance(given, Sequence) or not all(isinstance(each, Scene) for each in given):
+        raise TypeError(f"{owner}: scene must be a Scene or a list of Scenes, got {given!r}; "
+                        "build one with particlesim.Scene().")  # fmt: skip
+    if worlds is not None:
+        raise validate.fail(
+            owner, "worlds", "be left out with a list of scenes", worlds, "each scene is a world"
+        )
+    if not given:
+        raise validate.fail(owner, "scene", "hold at least one Scene", given, "add a scene")
+    first = given[0]
+    for w, other in enumerate(given):
+        for what in ("interactions", "constraints"):
+            ours = [part.kind() for part in getattr(first, what)]
+            theirs = [part.kind() for part in getattr(other, what)]
+            if ours != theirs:
+                mine = [part.name for part in getattr(first, what)]
+                names = [part.name for part in getattr(other, what)]
+                raise validate.fail(
+                    owner, f"scenes[{w}].{what}", f"be of the kinds of scenes[0] ({mine})", names,
+                    "make a batch of scenes of one kind",
+                )  # fmt: skip
+        if [group.name for group in first.groups] != [group.name for group in other.groups]:
+            raise validate.fail(
+                owner, f"scenes[{w}].groups", "have the names of scenes[0]'s",
+                [group.name for group in other.groups], "make a batch of scenes of one kind",
+            )  # fmt: skip
+    return list(given)
 
 
 class Model:
@@ -62,7 +97,7 @@ class Model:
     @property
     def vectorised(self) -> bool:
         """Loops over pairs are C++ for the CPU's vector units, rather than Warp's own."""
-        return bool(self.device.is_cpu)
+        return self.device.is_cpu and fast_ways()
 
     def _attributes(self) -> dict[str, int | None]:
         result: dict[str, int | None] = {}
@@ -118,7 +153,7 @@ class Model:
             else precision.vec3 if np.ndim(column) == 2 else precision.scalar
             for key, column in columns.items()
         }  # fmt: skip
-        kind = parameter_struct(name, tuple(kinds.items()))
+        kind = structure(name, kinds)
         return kind, self.structures(kind, columns)
 
     def array(self, values: Any, dtype: Any) -> wp.array:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ..constraints.boundary_base import Boundary
+from ..constraints.boundary import Boundary
 from ..constraints.constraint import Constraint
 from ..constraints.contact import Contact
 from ..engine.execution.launch import launch
@@ -41,13 +41,9 @@ def _residuals(constraint: Any, sim: Source) -> tuple[np.ndarray, np.ndarray] | 
 def _of_tuples(constraint: Constraint, sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
     if not constraint.count:
         return None
-    model, tuples = sim.model, constraint.tuples
-    kernel = kernels.tuples_kernel(
-        constraint.evaluation(model, tuples.Item), model.precision, model.periodic,
-        "position_error" in sim.state, tuples.size, tuples.Item, constraint.relative,
-    )  # fmt: skip
-    inputs = [model.box, constraint.struct, constraint.bodies]
-    return _run(kernel, constraint.count, inputs, sim), tuples.world
+    kernel = kernels.tuples_kernel(constraint.tuples.solved(constraint, sim.state))
+    inputs = [sim.model.box, constraint.struct, constraint.bodies]
+    return _run(kernel, constraint.count, inputs, sim), constraint.tuples.world
 
 
 @_residuals.register(Boundary)
@@ -58,10 +54,7 @@ def _of_boundary(constraint: Boundary, sim: Source) -> tuple[np.ndarray, np.ndar
     if constraint.moving:
         inputs = [constraint.motion, constraint.clock, constraint.held.pose]
         launch(pose_kernel(model.precision), model.world_count, inputs, model.device)
-    kernel = kernels.boundary_kernel(
-        constraint.shape, model.precision, constraint.Params, "position_error" in sim.state,
-        constraint.moving,
-    )  # fmt: skip
+    kernel = kernels.boundary_kernel(constraint.form)
     inputs = [constraint.params, constraint.held, constraint.bodies]
     return _run(kernel, constraint.count, inputs, sim), constraint.held.world.numpy()
 

@@ -6,10 +6,8 @@ goes over its own worlds, so that the sums of every world run as they run when i
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -18,7 +16,7 @@ from ..engine.neighbors.lists import Neighbors
 from ..engine.state import State
 from ..engine.structs import filled
 from ..kernels.interactions import pair as kernels
-from ..kernels.precision import Precision, structure
+from ..kernels.precision import structure
 from ..scene.part import Interaction
 from .pair import Pair
 from .pair_loop import PairLoop
@@ -57,33 +55,23 @@ class PairPass(Interaction):
 def _fused(parts: Sequence[Pair]) -> tuple[PairLoop, wp.Function]:
     """The loop and the term of several pair forces together."""
     model, pairs = parts[0].model, parts[0].pairs
-    kinds = tuple((part.loop.Data, part.loop.Params) for part in parts)
-    Data, Params = _types(model.precision, *zip(*kinds, strict=True))
+    precision, names = model.precision, {f"part_{k}": part for k, part in enumerate(parts)}
+    loops = {name: part.loop for name, part in names.items()}
+    Data = structure("FusedData", {"x": wp.array(dtype=precision.vec3)}
+                     | {name: loop.Data for name, loop in loops.items()})  # fmt: skip
+    Params = structure("FusedParameters", {"cutoff_squared": precision.scalar}
+                       | {name: loop.Params for name, loop in loops.items()})  # fmt: skip
     data, columns = Data(), {}
     data.x = pairs.fields["position"]
-    for k, part in enumerate(parts):
-        setattr(data, f"part_{k}", filled(part.loop.Data, part.fields_of(pairs)))
-        columns[f"part_{k}"] = part.params.numpy()
+    for name, part in names.items():
+        setattr(data, name, filled(part.loop.Data, part.fields_of(pairs)))
+        columns[name] = part.params.numpy()
     columns["cutoff_squared"] = np.max(
         [each["cutoff_squared"] for each in columns.values()], axis=0
     )
     params = model.structures(Params, columns)
-    term = kernels.fused_term([part.term for part in parts], model.precision, Data, Params)
+    term = kernels.fused_term([part.term for part in parts], precision, Data, Params)
     return PairLoop(model, pairs, Data, data, Params, params), term
-
-
-@functools.cache
-def _types(precision: Precision, data: tuple[Any, ...], params: tuple[Any, ...]) -> tuple[Any, Any]:
-    """Structs of the parts' structs, the same ones for the same parts, so kernels are reused."""
-    own = {
-        "FusedData": ("x", wp.array(dtype=precision.vec3), data),
-        "FusedParameters": ("cutoff_squared", precision.scalar, params),
-    }
-    Data, Params = (
-        structure(name, {first: kind, **{f"part_{k}": each for k, each in enumerate(parts)}})
-        for name, (first, kind, parts) in own.items()
-    )
-    return Data, Params
 
 
 def fuse(interactions: Sequence[Interaction]) -> list[Interaction]:

@@ -79,7 +79,7 @@ class Springs(Interaction):
         return topology.distances(model, w, self.pairs)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        force, _ = kernels.spring_kernels(self.model.precision, self.model.periodic)
+        force = kernels.force_kernel(self.model.precision, self.model.periodic)
         inputs = [
             self.bonds, self.springs, self.model.box, state.position, state.velocity, state.force
         ] if self.count else []  # fmt: skip
@@ -101,7 +101,7 @@ class Springs(Interaction):
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         if not self.count:
             return
-        _, measure = kernels.spring_kernels(self.model.precision, self.model.periodic)
+        measure = kernels.measure_kernel(self.model.precision, self.model.periodic)
         inputs = [self.bonds, self.springs, self.model.box, state.position, energy, virial]
         launch(measure, self.count, inputs, self.model.device)
 

@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 
 from .. import validate
-from ..engine import batch
 from ..engine.frames import Frames
+from ..engine.model import batch
 from ..instruments.watchdog.incident import Incident
 from ..instruments.watchdog.watch import Watchdog
 from ..scene import __version__
@@ -107,7 +107,7 @@ def check(
         )  # fmt: skip
     if isinstance(scene, Scene) and worlds is None and header["copies"]:
         worlds = len(header["scenes"]["worlds"])
-    scenes = batch.scenes(scene, worlds)
+    scenes = batch(scene, worlds)
     found = difference(header["scenes"], fingerprint(scenes))
     if found:
         where, before, given = found

@@ -8,12 +8,18 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 
+def label(source: Any) -> str:
+    """What a module or a function of scenes is called in reports: without where it is from."""
+    name = getattr(source, "__name__", "scene")
+    return name.rpartition(".")[2].removeprefix("scene_")
+
+
 class Meter:
-    """Counts frames and measures their rate."""
+    """Counts frames, or whatever is done one by one, and measures the rate of frames."""
 
     def __init__(self) -> None:
-        self.done = 0
-        self.label, self.frames, self.particles, self.work = "", 0, 0, 0
+        self.done, self.frames, self.unit = 0, 0, "frames"
+        self.label, self.particles, self.work = "", 0, 0
         self.started = self.first = self.last = 0.0
 
     @contextlib.contextmanager
@@ -22,18 +28,33 @@ class Meter:
         self.label, self.frames, self.particles = label, frames, sim.particle_count
         self.work = self.particles * sim.settings.substeps
         self.started = time.perf_counter()
-        with _progress("frames", "{task.fields[detail]}") as bar:
-            count = f"{self.particles:,} particles"
-            task = bar.add_task(f"{label}: compiling", total=frames, detail=count)
+        count = f"{self.particles:,} particles"
+        with bar(label, "frames", frames, count) as show:
 
             def after_frame(frame: int, frames: int) -> None:
                 self.done += 1
                 self.last = time.perf_counter()
                 self.first = self.first or self.last
-                detail = f"{count}, {self.rate()}"
-                bar.update(task, completed=frame, description=label, detail=detail)
+                show(frame, frames, detail=f"{count}, {self.rate()}")
 
             yield after_frame
+
+    @contextlib.contextmanager
+    def count(
+        self, label: str, unit: str = "frames", at_last: str = ""
+    ) -> Iterator[Callable[..., None]]:
+        """Show a bar; yields what is called with (done, all), and with what is being done.
+
+        ``at_last``: what is being done when all are.
+        """
+        self.unit = unit
+        with bar(label, unit) as show:
+
+            def count(done: int, total: int, doing: str = "") -> None:
+                self.done, self.frames = done, total
+                show(done, total, doing or (at_last if done == total else ""))
+
+            yield count
 
     def rate(self) -> str:
         """Particle-substeps a second; without the first frame, if there are others: it compiles."""
@@ -54,29 +75,45 @@ class Meter:
 
 
 @contextlib.contextmanager
-def bar(label: str, unit: str) -> Iterator[Callable[[int, int, str], None]]:
-    """Show a bar on a terminal; yields what is called with (done, total, what is being done)."""
-    with _progress(unit) as progress:
-        task = progress.add_task(f"{label}: compiling", total=None)
+def bar(
+    label: str, unit: str, total: int | None = None, detail: str = ""
+) -> Iterator[Callable[..., None]]:
+    """Show a bar on a terminal; yields ``show(done, total, doing="", detail="")``."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
 
-        def show(done: int, total: int, doing: str) -> None:
-            progress.update(task, completed=done, total=total, description=f"{label}: {doing}")
+    columns = [
+        TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(),
+        TextColumn(unit), TextColumn("{task.fields[detail]}", markup=False), TimeRemainingColumn(),
+    ]  # fmt: skip
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+        task = progress.add_task(f"{label}: compiling", total=total, detail=detail)
+
+        def show(done: int, total: int, doing: str = "", detail: str = "") -> None:
+            words = f"{label}: {doing}" if doing else label
+            progress.update(task, completed=done, total=total, description=words, detail=detail)
 
         yield show
 
 
 @contextlib.contextmanager
-def _progress(*texts: str) -> Iterator[Any]:
-    """A line on a terminal: what is done, a bar, texts, and when it will be over."""
-    from rich import progress
+def announced(words: str) -> Iterator[None]:
+    """Show words on a terminal while something is under way, and take them away."""
     from rich.console import Console
+    from rich.live import Live
+    from rich.text import Text
 
-    name, *columns = (
-        progress.TextColumn(text, markup=False) for text in ("{task.description}", *texts)
-    )
-    counted = [name, progress.BarColumn(), progress.MofNCompleteColumn(), *columns]
     console = Console(stderr=True)
-    with progress.Progress(
-        *counted, progress.TimeRemainingColumn(), console=console, disable=not console.is_terminal
-    ) as shown:
-        yield shown
+    if not console.is_terminal:
+        yield
+        return
+    # Drawn once, not from a thread: what starts may itself be at work on the stream.
+    with Live(Text(words), console=console, auto_refresh=False, transient=True):
+        yield

@@ -13,6 +13,7 @@ import warp as wp
 
 from .. import validate
 from ..kernels.precision import Precision, translate
+from ..kernels.warp_internals import written_in_python
 
 UNROLLED = 16  # rounds up to which Warp writes a loop out
 
@@ -99,9 +100,8 @@ def _helper(value: Any, precision: Precision) -> Any:
 
 def _as_law(value: Any) -> Any:
     """Warp functions written in Python are read as laws."""
-    if isinstance(value, wp.Function) and value.func is not None and value.native_snippet is None:
-        return _law_of(value.func)
-    return value
+    func = written_in_python(value)
+    return _law_of(func) if func else value
 
 
 def _scope(func: Callable[..., Any]) -> dict[str, Any]:
@@ -160,8 +160,7 @@ def law(func: Callable[..., Any]) -> Law:
     """
     if isinstance(func, Law):
         return func
-    if isinstance(func, wp.Function) and func.func is not None:
-        func = func.func
+    func = written_in_python(func) or func
     if not inspect.isfunction(func):
         raise TypeError(f"law: func must be a function, got {func!r}; decorate a def.")
     return Law(func)

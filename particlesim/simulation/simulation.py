@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any, Self
 
 from .. import validate
-from ..engine import batch
 from ..engine.execution.executors import Executor
 from ..engine.frames import Frames
 from ..engine.loop import Loop
+from ..engine.model import batch
 from ..instruments.ledger.accounts import Accounts
 from ..instruments.stability.check import automatic, warn_if_past
 from ..instruments.watchdog.watch import Watchdog
@@ -57,7 +57,7 @@ class Simulation(Reading):
             raise TypeError(
                 f"Simulation: settings must be a Settings, got {settings!r}; use Settings(...)."
             )
-        scenes = batch.scenes(scene, worlds)
+        scenes = batch(scene, worlds)
         if settings.automatic:
             settings = automatic(scenes, settings, device)
         # A ledger keeps account of every part by itself.

@@ -5,7 +5,7 @@ import pytest
 import particlesim as ps
 from cases.watchdog import falling, quietly
 from particlesim.engine.frames import Frames
-from particlesim.instruments.watchdog import audit
+from particlesim.instruments.watchdog.trace import REFINEMENTS
 
 # False alarms -----------------------------------------------------------------------------------
 
@@ -41,7 +41,7 @@ def test_an_audit_costs_three_refinements(device, monkeypatch):
     sim = ps.Simulation(scene, settings.replace(energy_growth=1.5), device=device)
     quietly(sim, 3)
     assert sim.incidents == []
-    assert done[:3] == [settings.substeps * each for each in audit.REFINEMENTS]
+    assert done[:3] == [settings.substeps * each for each in REFINEMENTS]
 
 
 def test_knobs_are_checked(refused):

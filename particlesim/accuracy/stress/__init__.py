@@ -1,6 +1,1 @@
 """Stress: does a scene hold at the extremes of its knobs and of its state, or does it say so?"""
-
-from .sweep import stress
-from .table import Stress
-
-__all__ = ["Stress", "stress"]

@@ -10,11 +10,12 @@ from ... import validate
 from ...instruments.watchdog.incident import SimulationError
 from ...scene.scene import Scene
 from ...scene.settings import Settings
-from ...simulation.simulation import Simulation
+from ..study import Plan, Study
 from .cases import Case, cases
 from .table import FAILED, HELD, RECOVERED, REFUSED, Result, Stress
 from .trace import Trace
 
+OWNER = "stress"
 FINER = 4  # times the substeps of the scene, in the run that shows what is right
 TOLERANCE = 0.2  # of the scales in Trace.difference
 
@@ -62,25 +63,21 @@ def stress(
         >>> ps.stress(build, ps.Settings(), frames=2, device="cpu").count("failed")
         0
     """
-    validate.whole("stress", "frames", frames, minimum=1)
-    validate.number("stress", "tolerance", tolerance, above=0.0)
-    sweep = _Sweep(build, settings, frames, tolerance, device, worlds)
-    every = cases(settings)
+    validate.whole(OWNER, "frames", frames, minimum=1)
+    validate.number(OWNER, "tolerance", tolerance, above=0.0)
+    study = Study(OWNER, build, settings, frames=frames, device=device, worlds=worlds)
+    sweep, every = _Sweep(study, tolerance), cases(study.settings)
     results = []
     for k, case in enumerate(every):
         if progress:
             progress(k, len(every), case.name)
         results.append(sweep.run(case))
-    return Stress(tuple(results), settings, frames, tolerance)
+    return Stress(tuple(results), study.settings, frames, tolerance)
 
 
 class _Sweep:
-    def __init__(
-        self, build: Callable[[], Scene | Sequence[Scene]], settings: Settings, frames: int,
-        tolerance: float, device: Any, worlds: int | None,
-    ):  # fmt: skip
-        self.build, self.settings, self.frames = build, settings, frames
-        self.tolerance, self.device, self.worlds = tolerance, device, worlds
+    def __init__(self, study: Study, tolerance: float):
+        self.study, self.settings, self.tolerance = study, study.settings, tolerance
         self._references: dict[Any, Trace] = {}
 
     def run(self, case: Case) -> Result:
@@ -134,13 +131,13 @@ class _Sweep:
 
     def _trace(self, case: Case, settings: Settings) -> Trace:
         trace = Trace()
-        sim = Simulation(self.build(), settings, device=self.device, worlds=self.worlds)
+        sim = self.study.simulation(Plan({}, self.study.options, settings, self.study.frames))
         try:
             if case.disturb is not None:
                 sim.diagnostics()  # has every array there that a case may change
                 case.disturb(sim)
             trace.add(sim)
-            sim.run(self.frames, progress=lambda done, frames: trace.add(sim))
+            sim.run(self.study.frames, progress=lambda done, frames: trace.add(sim))
         finally:
             sim.close()
         return trace

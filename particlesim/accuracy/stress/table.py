@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from ... import validate
 from ...scene.settings import Settings
+from ..table import grid
 
 HELD, REFUSED, RECOVERED, FAILED = OUTCOMES = ("held", "refused", "recovered", "failed")
 
@@ -50,14 +51,14 @@ class Stress:
         return sum(each.outcome == outcome for each in self.results)
 
     def __str__(self) -> str:
-        width = max(len(each.name) for each in self.results)
-        lines = [f"{'case':<{width}}  outcome    energy   place    what was said"]
-        for each in self.results:
-            numbers = "  ".join(
-                f"{'' if value is None else format(value, '.1e'):<7}"
-                for value in (each.energy, each.place)
-            )
-            words = textwrap.shorten(each.words, 100, placeholder=" ...")
-            lines.append(f"{each.name:<{width}}  {each.outcome:<9}  {numbers}  {words}".rstrip())
+        heads = [(name, "left") for name in ("case", "outcome", "energy", "place", "what was said")]
+        lines = grid(heads, [_cells(each) for each in self.results])
         total = ", ".join(f"{self.count(outcome)} {outcome}" for outcome in OUTCOMES)
         return "\n".join([*lines, "", f"{len(self)} cases: {total}"])
+
+
+def _cells(result: Result) -> list[str]:
+    numbers = (result.energy, result.place)
+    shown = ("" if value is None else format(value, ".1e") for value in numbers)
+    words = textwrap.shorten(result.words, 100, placeholder=" ...")
+    return [result.name, result.outcome, *shown, words]

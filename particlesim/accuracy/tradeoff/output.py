@@ -1,4 +1,4 @@
-"""A trade-off as text, as JSON and as CSV."""
+"""The rows of a trade-off as text, as JSON and as CSV."""
 
 from __future__ import annotations
 
@@ -7,71 +7,48 @@ import dataclasses
 import io
 import json
 import math
-import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ... import validate
-from .table import Row, Tradeoff
+from ..table import amount, check_new, grid, shown, write
+from .row import Row
 
 FORMATS = (".json", ".csv")
 
 
-def check_path(owner: str, path: Path, formats: Sequence[str], overwrite: bool) -> None:
-    """Refuse a file of another suffix, and one that exists."""
-    if path.suffix.lower() not in formats:
-        raise validate.fail(
-            owner, "path", f"end in {', '.join(formats)}", str(path), "choose one of these"
-        )
-    if path.exists() and not overwrite:
-        raise validate.fail(
-            owner, "path", "be a new file", str(path), "choose another or overwrite it"
-        )
+def save(
+    path: Path, overwrite: bool, about: dict[str, Any], rows: Sequence[Row], front: Sequence[Row]
+) -> None:
+    """Write rows as the suffix says (see :meth:`Tradeoff.save`)."""
+    owner = "Tradeoff.save"
+    check_new(owner, "path", path, FORMATS, overwrite)
+    is_json = path.suffix.lower() == ".json"
+    content = as_json(about, rows, front) if is_json else as_csv(rows, front)
+    write(owner, path, content.encode())
 
 
-def replace(path: Path, content: bytes) -> None:
-    """Write a file at once or not at all."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(content)
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
-def save(table: Tradeoff, path: Path, overwrite: bool) -> None:
-    """Write a table as its suffix says (see :meth:`Tradeoff.save`)."""
-    check_path("Tradeoff.save", path, FORMATS, overwrite)
-    content = as_json(table) if path.suffix.lower() == ".json" else as_csv(table)
-    replace(path, content.encode())
-
-
-def as_json(table: Tradeoff) -> str:
+def as_json(about: dict[str, Any], rows: Sequence[Row], front: Sequence[Row]) -> str:
     """Everything; numbers that are not finite become null."""
-    front = {id(row) for row in table.pareto()}
     document = {
-        **{name: getattr(table, name) for name in table.__dataclass_fields__ if name != "rows"},
-        "order": table.orders(),
+        **about,
         "rows": [
             {
-                **_figures(row),
-                "pareto": id(row) in front,
+                **_figures(row, front),
                 "costs": row.costs,
                 "values": row.values,
                 "settings": dataclasses.asdict(row.settings),
                 "options": row.options,
             }
-            for row in table.rows
+            for row in rows
         ],
     }
     return json.dumps(_plain(document), indent=1, allow_nan=False) + "\n"
 
 
-def as_csv(table: Tradeoff) -> str:
+def as_csv(rows: Sequence[Row], front: Sequence[Row]) -> str:
     """One line a row: what varied, then what was measured."""
-    front = {id(row) for row in table.pareto()}
-    lines = [{**row.values, **_figures(row), "pareto": id(row) in front} for row in table.rows]
+    lines = [{**row.values, **_figures(row, front)} for row in rows]
     stream = io.StringIO()
     writer = csv.DictWriter(stream, list(lines[0]) if lines else [], lineterminator="\n")
     writer.writeheader()
@@ -79,7 +56,7 @@ def as_csv(table: Tradeoff) -> str:
     return stream.getvalue()
 
 
-def _figures(row: Row) -> dict[str, Any]:
+def _figures(row: Row, front: Sequence[Row]) -> dict[str, Any]:
     """What was measured, with its units in the names."""
     return {
         "error": row.error,
@@ -90,6 +67,7 @@ def _figures(row: Row) -> dict[str, Any]:
         "particle_substeps_per_second": row.rate,
         "particles": row.particles,
         "array_bytes": row.array_bytes,
+        "pareto": any(row is each for each in front),
     }
 
 
@@ -104,65 +82,21 @@ def _plain(value: Any) -> Any:
     return value if value is None or isinstance(value, bool | int | str) else str(value)
 
 
-def text(table: Tradeoff) -> str:
-    """The table for people: one line a row, a star on the Pareto front, causes below."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    grid = Table(box=box.SIMPLE, show_edge=False, pad_edge=False)
-    for name in table.vary:
-        grid.add_column(name, justify="right")
-    for name in ("error", "s per s", "spread", "particle-substeps/s", "arrays", ""):
-        grid.add_column(name, justify="left" if not name else "right")
-    front = {id(row) for row in table.pareto()}
-    for row in table.rows:
-        mark = "diverged" if row.diverged else "*" if id(row) in front else ""
-        grid.add_row(
-            *(_shown(row.values[name]) for name in table.vary),
-            _shown(row.error), _shown(row.cost), _percent(row),
-            amount(row.rate), f"{amount(row.array_bytes, 1024)}B", mark,
-        )  # fmt: skip
-    stream = io.StringIO()
-    console = Console(file=stream, width=1000, color_system=None, markup=False, highlight=False)
-    console.print(grid)
-    lines = [line.rstrip() for line in stream.getvalue().splitlines()]
-    return "\n".join([*_heading(table), "", *lines, "", *_notes(table)])
+def lines(names: Iterable[str], rows: Sequence[Row], front: Sequence[Row]) -> list[str]:
+    """The table for people: one line a row, a star on the Pareto front."""
+    names = list(names)
+    measured = ("error", "s per s", "spread", "particle-substeps/s", "arrays")
+    heads = [(name, "right") for name in (*names, *measured)]
+    return grid([*heads, ("", "left")], [_cells(row, names, front) for row in rows])
 
 
-def _heading(table: Tradeoff) -> list[str]:
-    runs = "1 run" if table.repeats == 1 else f"median of {table.repeats} runs"
+def _cells(row: Row, names: list[str], front: Sequence[Row]) -> list[str]:
+    star = "*" if any(row is each for each in front) else ""
     return [
-        f"{table.scene}: {table.duration:g} s on {table.device}, {runs}",
-        f"error: {table.error}",
-        "s per s: wall seconds per simulated second; *: nothing is both cheaper and more accurate",
+        *(shown(row.values[name]) for name in names),
+        *(shown(value) if math.isfinite(value) else "-" for value in (row.error, row.cost)),
+        f"{100 * row.spread:.0f} %" if len(row.costs) > 1 else "-",
+        amount(row.rate),
+        f"{amount(row.array_bytes, 1024)}B",
+        "diverged" if row.diverged else star,
     ]
-
-
-def _notes(table: Tradeoff) -> list[str]:
-    notes = [f"order of convergence of {knob}: {p:.2f}" for knob, p in table.orders().items()]
-    if table.process_bytes:
-        notes.append(f"most memory of the whole process: {amount(table.process_bytes, 1024)}B")
-    return notes + [f"diverged, {row.label()}: {row.cause}" for row in table.diverged]
-
-
-def _percent(row: Row) -> str:
-    return f"{100 * row.spread:.0f} %" if len(row.costs) > 1 else "-"
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.3g}" if math.isfinite(value) else "-"
-    return str(value)
-
-
-def amount(value: float, step: int = 1000) -> str:
-    """A number with a prefix, as ``1.23 M``."""
-    if not math.isfinite(value):
-        return "-"
-    for prefix in ("", "k", "M", "G"):
-        if abs(value) < 999.5 or prefix == "G":
-            break
-        value /= step
-    binary = "i" if prefix and step == 1024 else ""
-    return f"{value:.3g} {prefix.upper() if binary else prefix}{binary}"

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from .output import check_path, replace
-from .table import Row, Tradeoff
+from ..table import check_new, shown, write
+from .row import Row
 
 FORMATS = (".png", ".svg", ".pdf")
 LABELS = 60  # points that still get their value written beside them
@@ -29,48 +30,58 @@ def figure_class() -> Any:
     return Figure
 
 
-def plot(table: Tradeoff, path: Path, overwrite: bool) -> None:
-    """Draw a table (see :meth:`Tradeoff.plot`)."""
-    check_path("Tradeoff.plot", path, FORMATS, overwrite)
+def plot(
+    path: Path,
+    overwrite: bool,
+    about: tuple[str, str],
+    vary: Mapping[str, Sequence[Any]],
+    rows: Sequence[Row],
+    front: Sequence[Row],
+) -> None:
+    """Draw rows (see :meth:`Tradeoff.plot`); ``about``: the title, and what the error is."""
+    owner = "Tradeoff.plot"
+    check_new(owner, "path", path, FORMATS, overwrite)
     figure = figure_class()(figsize=(7.0, 4.6), layout="constrained")
     axes = figure.add_subplot()
-    along, floor = _longest(table), _floor(table)
-    for series, rows in _series(table, along).items():
-        good = [row for row in rows if not row.diverged]
+    # The lines follow the knob with the most values.
+    along = max(vary, key=lambda name: len(vary[name]))
+    # An error of zero has no place on a logarithmic axis.
+    floor = 0.1 * min((row.error for row in rows if not row.diverged and row.error > 0), default=1)
+    named = len(rows) <= LABELS
+    for series, members in _series(rows, along).items():
+        good = [row for row in members if not row.diverged]
         # No line and no legend for a single series without a name.
         axes.plot(
             [row.cost for row in good], [max(row.error, floor) for row in good],
             "o-", markersize=4, linewidth=1, label=series or None,
         )  # fmt: skip
-        for row in good if len(table.rows) <= LABELS else []:
+        for row in good if named else []:
             axes.annotate(
-                _value(row, along), (row.cost, max(row.error, floor)), fontsize=7,
+                shown(row.values[along]), (row.cost, max(row.error, floor)), fontsize=7,
                 xytext=(3, 3), textcoords="offset points",
             )  # fmt: skip
-    front = table.pareto()
     if front:
         axes.step(
             [row.cost for row in front], [max(row.error, floor) for row in front],
             where="post", color="0.3", linestyle="--", linewidth=1, label="Pareto front", zorder=0,
         )  # fmt: skip
-    _draw_diverged(axes, table, along)
+    _draw_diverged(axes, [row for row in rows if row.diverged and row.costs], along, named)
     axes.set(
         xscale="log", yscale="log" if front else "linear",
         xlabel="cost [wall seconds per simulated second]",
-        ylabel="error", title=f"{table.scene}: error by {along}",
+        ylabel="error", title=f"{about[0]} by {along}",
     )  # fmt: skip
-    axes.set_title(table.error, fontsize=7, loc="right", y=-0.22)
+    axes.set_title(about[1], fontsize=7, loc="right", y=-0.22)
     axes.grid(True, which="major", alpha=0.3)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8)
     stream = io.BytesIO()
     figure.savefig(stream, format=path.suffix.lower()[1:], dpi=150)
-    replace(path, stream.getvalue())
+    write(owner, path, stream.getvalue())
 
 
-def _draw_diverged(axes: Any, table: Tradeoff, along: str) -> None:
+def _draw_diverged(axes: Any, rows: Sequence[Row], along: str, named: bool) -> None:
     """Crosses along the top edge, where there is no error to place them by."""
-    rows = [row for row in table.diverged if row.costs]
     if not rows:
         return
     edge = axes.get_xaxis_transform()
@@ -78,33 +89,17 @@ def _draw_diverged(axes: Any, table: Tradeoff, along: str) -> None:
         [row.cost for row in rows], [0.97] * len(rows), "x", color="tab:red", transform=edge,
         label="diverged", clip_on=False,
     )  # fmt: skip
-    for row in rows if len(table.rows) <= LABELS else []:
+    for row in rows if named else []:
         axes.annotate(
-            _value(row, along), (row.cost, 0.97), xycoords=edge, fontsize=7, color="tab:red",
-            xytext=(3, -8), textcoords="offset points",
+            shown(row.values[along]), (row.cost, 0.97), xycoords=edge, fontsize=7,
+            color="tab:red", xytext=(3, -8), textcoords="offset points",
         )  # fmt: skip
 
 
-def _longest(table: Tradeoff) -> str:
-    """The knob that the lines follow: of those that vary, the one with the most values."""
-    return max(table.vary, key=lambda name: len(table.vary[name]))
-
-
-def _series(table: Tradeoff, along: str) -> dict[str, list[Row]]:
+def _series(rows: Sequence[Row], along: str) -> dict[str, list[Row]]:
     """Rows that differ in the knob ``along`` only, by what the others are."""
     series: dict[str, list[Row]] = {}
-    for row in table.rows:
-        others = (f"{name}={row.values[name]}" for name in table.vary if name != along)
+    for row in rows:
+        others = (f"{name}={value}" for name, value in row.values.items() if name != along)
         series.setdefault(", ".join(others), []).append(row)
     return series
-
-
-def _floor(table: Tradeoff) -> float:
-    """Where to draw an error of zero, which has no place on a logarithmic axis."""
-    least = min((row.error for row in table.stable if row.error > 0), default=1.0)
-    return 0.1 * least
-
-
-def _value(row: Row, along: str) -> str:
-    value = row.values[along]
-    return f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from ... import validate
+from ...output.progress import Meter
 from ...scene.settings import Settings
-from .bar import bar
-from .converged import Converged
-from .judges import EnergyDrift, Judge, Known, MomentumDrift
-from .plan import OWNER, Plan, Study
-from .run import Run
-from .table import Row, Tradeoff
+from ..judging import choose_judge, mark, measure
+from ..run import Run
+from ..study import Study
+from .row import Row
+from .table import Tradeoff
 
-ERRORS = ("known", "converged", "energy", "momentum")
+OWNER = "tradeoff"
 Progress = Callable[[int, int], None]
 
 
@@ -38,27 +37,26 @@ def tradeoff(
     """Measure what settings cost, and how accurate they are: every combination of ``vary``.
 
     Every setting is run from the start over the same simulated time, after a warm-up that is not
-    timed, ``repeats`` times and in turn with the others, so that a noisy machine does not decide.
-    Settings that diverge (the simulation fails, the error is not finite or beyond the bound) are
-    marked, and kept in the table.
+    timed, in turn with the others, so that a noisy machine does not decide. What diverges (it
+    fails, or its error is not finite or beyond the bound) is marked, and kept in the table.
 
     Args:
-        build: ``build(**options) -> Scene``. What is not given here is taken from its module, if
-            that is a scene module: ``settings``, ``frames`` and ``error``.
+        build: ``build(**options) -> Scene``. Of a scene module, that module's ``settings``,
+            ``frames`` and ``error`` hold where None is given.
         vary: Lists of values by name: fields of Settings, and options of ``build``.
         error: ``error(sim) -> float`` at the end of a run, whose size counts; ``"known"``: that of
             the module; ``"converged"``: rms distance of the particles from a reference;
-            ``"energy"`` or ``"momentum"``: largest drift of what should be conserved. None: the
-            known one over the module's own frames, otherwise converged.
+            ``"energy"`` or ``"momentum"``: largest drift of what is conserved. None: the known
+            one over the module's own frames, otherwise converged.
         reference: For ``"converged"``: positions (n, 3), or what the reference run is to take, a
             dict of knobs and options; needed where options of ``build`` vary. Unless ``substeps``
             or ``dt`` is given, substeps are refined until the reference stops changing.
         repeats: Timed runs of each setting, at least 1.
-        frames: Frames of ``settings.dt``. None: those of the module, or 240.
-        settings: The knobs that do not vary. None: those of the module, or Settings().
+        frames: Frames of ``settings.dt``; 240 where nothing says how many.
+        settings: The knobs that do not vary.
         options: Options of ``build`` that do not vary.
-        bound: Error beyond which a setting counts as diverged. None: ten times what the motion
-            or the size of the scene amounts to; infinite for known answers.
+        bound: Error beyond which a setting diverged. None: ten times what the motion or the size
+            of the scene amounts to; infinite for known answers.
         device: As for Simulation.
         progress: True for a bar, or a function of (frames done, all frames).
 
@@ -72,112 +70,49 @@ def tradeoff(
         ...     _ = scene.add_interaction(UniformGravity((0, -10, 0)))
         ...     return scene
         >>> table = tradeoff(
-        ...     fall, {"substeps": [1, 2, 4]}, frames=10, device="cpu", repeats=1,
+        ...     fall, {"substeps": [1, 2, 4]}, frames=10, repeats=1, device="cpu",
         ...     settings=Settings(dt=0.1, precision="float64"),
         ...     error=lambda sim: sim.position[0, 1] - (1 - 5 * sim.time**2))
         >>> [round(row.error, 9) for row in table.rows], round(table.order("substeps"), 6)
         ([0.5, 0.25, 0.125], 1.0)
     """
-    study = Study(build, settings, options, frames, device)
+    study = Study(OWNER, build, settings, options, frames, device)
+    shown = Meter().count(study.label, at_last="reference")
+    with shown if progress is True else contextlib.nullcontext(progress or None) as show:
+        return sweep(study, vary, error, reference, repeats, bound, show)
+
+
+def sweep(
+    study: Study,
+    vary: Mapping[str, Iterable[Any]],
+    error: Any,
+    reference: Any,
+    repeats: int,
+    bound: float | None,
+    progress: Progress | None,
+) -> Tradeoff:
+    """The table of a study (see :func:`tradeoff`)."""
     plans = study.plans(vary)
     repeats = validate.whole(OWNER, "repeats", repeats, minimum=1)
     judge = choose_judge(study, plans, error, reference)
     if bound is not None:
         bound = validate.number(OWNER, "bound", bound, above=0.0, infinite=True)
-    runs = [Run(plan, study.simulation(plan)) for plan in plans]
-    with bar(study.label) if progress is True else contextlib.nullcontext(progress) as show:
-        measure(runs, judge, repeats, show if callable(show) else None)
-    limit = judge.bound if bound is None else bound
-    mark(runs, limit)
-    names = {name: distinct([plan.values[name] for plan in plans]) for name in vary}
-    return table(study, runs, names, judge.describe(), limit, repeats)
-
-
-def choose_judge(study: Study, plans: Sequence[Plan], error: Any, reference: Any) -> Judge:
-    """What gives the runs their errors."""
-    if error is None:
-        known = study.known_here and reference is None
-        error = "known" if known else "converged"
-    if error != "converged" and reference is not None:
-        raise validate.fail(
-            OWNER, "error", "be 'converged' with a reference", error, "leave one of them out"
-        )
-    if callable(error):
-        return Known(error)
-    validate.choice(OWNER, "error", error, ERRORS)
-    if error == "converged":
-        return Converged(study, plans, reference)
-    if error == "known":
-        if study.known is None:
-            raise validate.fail(
-                OWNER, "error", f"be another where {study.label} has no error(sim)", error,
-                "pass a function, 'converged', 'energy' or 'momentum'",
-            )  # fmt: skip
-        return Known(study.known)
-    return EnergyDrift() if error == "energy" else MomentumDrift()
-
-
-def measure(runs: Sequence[Run], judge: Judge, repeats: int, progress: Progress | None) -> None:
-    """Warm up, run in turn, and judge."""
-    judge.check(runs)
-    done, total = 0, repeats * sum(run.plan.frames for run in runs)
-
-    def count(frames: int = 1) -> None:
-        nonlocal done
-        done += frames
-        if progress is not None:
-            progress(done, total)
-
-    for run in runs:
-        run.warm_up()
-    for repeat in range(repeats):
-        watch = judge.watch if judge.watches and repeat == 0 else None
-        for run in runs:
-            if run.cause and repeat:
-                count(run.plan.frames)  # it would go the same way again
-                continue
-            run.cause = ""
-            run.advance(watch, count)
-            if repeat == 0 and not run.cause:
-                judge.finish(run)
-    for run in runs:
-        run.sim.close()
-    judge.judge(runs)
-
-
-def mark(runs: Sequence[Run], bound: float) -> None:
-    """Have runs count as diverged whose error is not finite or beyond the bound."""
-    for run in runs:
-        if not run.cause and not run.error <= bound:
-            which = "be finite" if not math.isfinite(run.error) else f"be at most {bound:g}"
-            run.cause = f"error must {which}, got {run.error:g}"
-
-
-def table(
-    study: Study,
-    runs: Sequence[Run],
-    vary: dict[str, list[Any]],
-    error: str,
-    bound: float,
-    repeats: int,
-) -> Tradeoff:
-    """The table of runs that are done and judged."""
+    runs = [Run(study, plan) for plan in plans]
+    measure(runs, judge, repeats, progress)
+    bound = judge.bound if bound is None else bound
+    mark(runs, bound)
+    varied = {name: {repr(plan.values[name]): plan.values[name] for plan in plans} for name in vary}
     return Tradeoff(
         scene=study.label,
-        error=error,
+        error=judge.describe(),
         rows=[row(run) for run in runs],
-        vary=vary,
+        vary={name: list(values.values()) for name, values in varied.items()},
         duration=study.duration,
         repeats=repeats,
         device=str(runs[0].sim.device),
         bound=bound,
         process_bytes=process_bytes(),
     )
-
-
-def distinct(values: Sequence[Any]) -> list[Any]:
-    """Without repeats, in order; values need not be hashable."""
-    return list({repr(value): value for value in values}.values())
 
 
 def row(run: Run) -> Row:

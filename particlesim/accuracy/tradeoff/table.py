@@ -11,62 +11,13 @@ from typing import Any
 import numpy as np
 
 from ... import validate
-from ...scene.settings import Settings
+from ..table import amount
+from . import output
 from .order import fitted_order
+from .plot import plot
+from .row import Row
 
 STEPS = ("dt",)  # of these less is finer
-
-
-@dataclass(frozen=True)
-class Row:
-    """One setting of a sweep, and what was measured of it.
-
-    Args:
-        values: What was varied, by name.
-        settings: All knobs.
-        options: Of ``build``.
-        error: At the end; not finite if the run stopped before.
-        cause: Why it counts as diverged; empty if it does not.
-        costs: Wall seconds per simulated second, one a repeat.
-        particles: How many.
-        array_bytes: Of all arrays of the simulation.
-    """
-
-    values: dict[str, Any]
-    settings: Settings
-    options: dict[str, Any]
-    error: float
-    cause: str
-    costs: tuple[float, ...]
-    particles: int
-    array_bytes: int
-
-    @property
-    def diverged(self) -> bool:
-        """Whether it stopped, ended without a finite error, or ended beyond the bound."""
-        return bool(self.cause)
-
-    @property
-    def cost(self) -> float:
-        """Median wall seconds per simulated second; nan if not one frame was done."""
-        return float(np.median(self.costs)) if self.costs else math.nan
-
-    @property
-    def spread(self) -> float:
-        """Half of what lies between the fastest and the slowest repeat, over the cost."""
-        return (max(self.costs) - min(self.costs)) / (2 * self.cost) if self.costs else math.nan
-
-    @property
-    def rate(self) -> float:
-        """Particle-substeps per wall second."""
-        return self.particles / (self.settings.substep * self.cost) if self.costs else math.nan
-
-    def __getitem__(self, name: str) -> Any:
-        return self.values[name]
-
-    def label(self) -> str:
-        """What was varied, as ``substeps=5, precision=float32``."""
-        return ", ".join(f"{name}={_short(value)}" for name, value in self.values.items())
 
 
 @dataclass(frozen=True)
@@ -202,9 +153,9 @@ class Tradeoff:
         Raises:
             ValueError: Another suffix, or a file that exists.
         """
-        from .output import save
-
-        save(self, Path(path), overwrite)
+        about = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "rows"}
+        about["order"] = self.orders()
+        output.save(Path(path), overwrite, about, self.rows, self.pareto())
 
     def plot(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Draw error against cost with the Pareto front into a picture; needs matplotlib.
@@ -216,15 +167,19 @@ class Tradeoff:
         Raises:
             ImportError: matplotlib is missing. ValueError: Another suffix, or a file that exists.
         """
-        from .plot import plot
-
-        plot(self, Path(path), overwrite)
+        about = f"{self.scene}: error", self.error
+        plot(Path(path), overwrite, about, self.vary, self.rows, self.pareto())
 
     def __str__(self) -> str:
-        from .output import text
-
-        return text(self)
-
-
-def _short(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+        runs = "1 run" if self.repeats == 1 else f"median of {self.repeats} runs"
+        notes = [f"order of convergence of {knob}: {p:.2f}" for knob, p in self.orders().items()]
+        if self.process_bytes:
+            notes.append(f"most memory of the whole process: {amount(self.process_bytes, 1024)}B")
+        return "\n".join([
+            f"{self.scene}: {self.duration:g} s on {self.device}, {runs}",
+            f"error: {self.error}",
+            "s per s: wall seconds per simulated second; *: nothing is both cheaper and more "
+            "accurate",
+            "", *output.lines(self.vary, self.rows, self.pareto()), "",
+            *notes, *(f"diverged, {row.label()}: {row.cause}" for row in self.diverged),
+        ])  # fmt: skip

@@ -9,13 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ..tradeoff.judges import Judge
-from ..tradeoff.plan import Study
-from ..tradeoff.run import Run
-from ..tradeoff.sweep import choose_judge, measure
-from .report import Trial, finite
-
-SEED = "seed"  # the option of build that makes another of the same kind
+from ..judges import Judge
+from ..judging import choose_judge, measure
+from ..run import Run
+from ..study import SEED, Study
+from .report import Trial
 
 
 class Bench:
@@ -23,7 +21,7 @@ class Bench:
 
     Args:
         studies: The scene, once a seed.
-        by: What the error is, as for :func:`particlesim.accuracy.tradeoff`.
+        by: What the error is, as for :func:`particlesim.tradeoff`.
         references: What each study is compared with, positions or None.
         show: Called with every trial as it is done.
     """
@@ -37,7 +35,7 @@ class Bench:
     ):
         self.studies, self.by, self.references, self.show = studies, by, references, show
         self.trials: list[Trial] = []
-        self.words = ""
+        self.words = self.device = ""
         self._known: dict[str, Trial] = {}
 
     def trial(self, values: Mapping[str, Any]) -> Trial:
@@ -53,20 +51,20 @@ class Bench:
     def _tried(self, values: Mapping[str, Any]) -> Trial:
         runs = []
         for study, reference in zip(self.studies, self.references, strict=True):
-            plan = study.plan(values)
-            run = Run(plan, study.simulation(plan))
-            judge = choose_judge(study, [plan], self.by, reference)
+            run = Run(study, study.plan(values))
+            judge = choose_judge(study, [run.plan], self.by, reference)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # of errors that are not finite: they count
-                measure([run], judge, 1, None)
-            self.words = judge.describe()
+                measure([run], judge, 1)
+            self.words, self.device = judge.describe(), str(run.sim.device)
             runs.append(run)
             if run.cause:
                 break  # once is enough to be out
         # All do the same work; what disturbs only slows.
         cost = min((min(run.costs) for run in runs if run.costs), default=math.inf)
         plan = runs[0].plan
-        errors = [math.inf if run.cause else finite(run.error) for run in runs]
+        failed = [bool(run.cause) or not math.isfinite(run.error) for run in runs]
+        errors = [math.inf if bad else run.error for bad, run in zip(failed, runs, strict=True)]
         return Trial(
             values=dict(values),
             settings=plan.settings,
@@ -83,21 +81,6 @@ class Bench:
         Infinite where it fails.
         """
         study = self.studies[0]
-        runs = []
-        for values in chosen:
-            plan = study.plan(values)
-            runs.append(Run(plan, study.simulation(plan)))
-        measure(runs, Judge(), repeats, None)
+        runs = [Run(study, study.plan(values)) for values in chosen]
+        measure(runs, Judge(), repeats)
         return [min(run.costs) if run.costs and not run.cause else math.inf for run in runs]
-
-
-def with_seeds(
-    study: Callable[[dict[str, Any]], Study], options: Mapping[str, Any], seeds: int
-) -> list[Study]:
-    """Studies of the scene, one a seed where ``build`` has them and none is given."""
-    first = study(dict(options))
-    parameter = first.parameters.get(SEED)
-    default = None if parameter is None else parameter.default
-    if SEED in options or not isinstance(default, int):
-        return [first]
-    return [first, *(study({**options, SEED: default + k}) for k in range(1, seeds))]

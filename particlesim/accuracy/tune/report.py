@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ...scene.settings import Settings
+from ..table import assignments
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,7 @@ class Trial:
         return self.error + self.spread
 
     def __str__(self) -> str:
-        knobs = ", ".join(
-            f"{name}={value:.4g}" if isinstance(value, float) else f"{name}={value}"
-            for name, value in self.values.items()
-        )
+        knobs = assignments(self.values, 4)
         return f"{knobs}: error {self.error:.3g}, {self.cost:.3g} s per s"
 
 
@@ -95,15 +92,12 @@ class Tuned:
 
     def __str__(self) -> str:
         build = ", ".join(f"{name}={value!r}" for name, value in self.options.items())
-        return "\n".join(
-            [
-                f"{self.scene} on {self.device}: error {self.error:.3g} of {self.tolerance:g} "
-                f"allowed, {self.cost:.3g} wall seconds per simulated second",
-                f"error: {self.measure}, the largest of {self.seeds} "
-                f"{'seeds' if self.seeds > 1 else 'run'}; {len(self.trials)} settings tried",
-                "",
-                self.line + (f"  # build({build})" if build else ""),
-            ]
+        return (
+            f"{self.scene} on {self.device}: error {self.error:.3g} of {self.tolerance:g} "
+            f"allowed, {self.cost:.3g} wall seconds per simulated second\n"
+            f"error: {self.measure}, the largest of {self.seeds} "
+            f"{'seeds' if self.seeds > 1 else 'run'}; {len(self.trials)} settings tried\n\n"
+            f"{self.line}{f'  # build({build})' if build else ''}"
         )
 
 
@@ -123,8 +117,3 @@ def _fraction(dt: float) -> str:
     whole = round(1.0 / dt) if dt > 0 and 1.0 / dt < 1e6 else 0
     exact = whole > 1 and 1.0 / whole == dt
     return min([repr(dt), *([f"1 / {whole}"] if exact else [])], key=len)
-
-
-def finite(value: float) -> float:
-    """``value``, or infinity where it is not a number."""
-    return value if math.isfinite(value) else math.inf

@@ -12,10 +12,9 @@ import numpy as np
 
 from ... import validate
 from ...scene.settings import INTEGRATORS, PRECISIONS, Settings
-from ...simulation.simulation import Simulation
-from ..tradeoff.plan import Study
-from .bench import Bench, with_seeds
-from .reference import settled
+from ..reference import settled
+from ..study import KNOBS, Study
+from .bench import Bench
 from .report import Trial, Tuned
 from .search import BETTER, Search, levels
 
@@ -44,18 +43,16 @@ def tune(
     """The cheapest settings whose error is at most ``error``, found by searching.
 
     Substeps are sought between the stability limit (``Simulation.stability``) and where more stop
-    to help; integrator, precision, iterations, skin and compensation, and whatever ``vary`` names,
-    are changed one by one as long as that makes it cheaper. So that other seeds of the scene meet
-    the tolerance too, the largest error of those tried, and as much as they differ on top of it,
-    must be within ``margin`` of it.
+    to help; integrator, precision, iterations, skin and compensation, and what ``vary`` names, are
+    changed one by one as long as that makes it cheaper. The largest error of all seeds tried, and
+    as much as they differ on top of it, must be within ``margin`` of the tolerance.
 
     Args:
-        build: ``build(**options) -> Scene``; ``settings``, ``frames`` and ``error`` of its module
-            hold where nothing else is given. With an option ``seed`` it is tried with several.
+        build: ``build(**options) -> Scene``. Of a scene module, that module's ``settings``,
+            ``frames`` and ``error`` hold where None is given. With an option ``seed`` it is tried
+            with several.
         error: The tolerance, in units of what it is measured by.
-        by: What the error is: a function of the simulation at its end, ``"known"``,
-            ``"converged"`` (rms distance of the particles from a reference [length]),
-            ``"energy"`` or ``"momentum"``, as for :func:`particlesim.accuracy.tradeoff`.
+        by: What the error is: ``error=`` of :func:`particlesim.tradeoff`.
         vary: Values of further knobs and of options of ``build`` by name, or other values of those
             above; a list of one holds a knob as it is.
         reference: For ``"converged"``, positions (n, 3), where one seed is tried; None: found by
@@ -63,73 +60,71 @@ def tune(
         margin: Part of the tolerance to stay under, above 0, at most 1.
         seeds: How many seeds to try everything with, at least 1.
         repeats: Timed runs, in turn, of the best and what differs from it only in cost.
-        frames: Frames of ``settings.dt``. None: those of the module, or 240.
-        settings: Where to start. None: those of the module, or Settings().
+        frames: Frames of ``settings.dt``; 240 where nothing says how many.
+        settings: Where to start.
         options: Options of ``build`` that do not vary.
         device: As for Simulation.
         progress: True to print every trial to stderr, or a function of it.
 
     Raises:
-        ValueError: Nothing meets the tolerance; the message says how small the error got. Or
+        ValueError: Nothing meets the tolerance (the message says how small the error got), or
             arguments that do not fit.
 
     Example:
-        >>> def swing():
-        ...     scene = Scene()
-        ...     _ = scene.add_particles([(0, 0, 0)], pinned=True)
-        ...     _ = scene.add_particles([(1.1, 0, 0)])
-        ...     _ = scene.add_interaction(Springs([(0, 1)], 100.0, 1.0))
-        ...     return scene
-        >>> found = tune(swing, 1e-3, frames=5, settings=Settings(dt=0.1), device="cpu")
-        >>> found.error <= 1e-3
+        >>> ball = Scene()
+        >>> _ = ball.add_particles([(0, 0, 0)], velocity=(1, 0, 0))
+        >>> _ = ball.add_interaction(Drag(linear=1.0))
+        >>> tune(lambda: ball, 1e-3, frames=5, settings=Settings(dt=0.1), device="cpu").error < 1e-3
         True
-        >>> found.settings.integrator
-        'velocity_verlet'
     """
-    tolerance = validate.number(OWNER, "error", error, above=0.0)
-    margin = validate.number(OWNER, "margin", margin, above=0.0, maximum=1.0)
     validate.whole(OWNER, "seeds", seeds, minimum=1)
-    validate.whole(OWNER, "repeats", repeats, minimum=1)
-
-    def study(chosen: dict[str, Any]) -> Study:
-        return Study(build, settings, chosen, frames, device)
-
-    studies = with_seeds(study, options or {}, 1 if reference is not None else seeds)
-    first = studies[0]
-    ladders, substeps, polish = _ladders(first, dict(vary or {}))
-    references = [reference] * len(studies)
-    if reference is None and _converges(first, by):
-        finest = _finest(ladders, first.settings)
-        references = [settled(each, dict(finest), tolerance) for each in studies]
-        by = "converged"
+    study = Study(OWNER, build, settings, options, frames, device)
+    studies = study.seeded(1 if reference is not None else seeds)
     show = _print if progress is True else progress if callable(progress) else None
+    return _search(studies, error, by, dict(vary or {}), reference, margin, repeats, show)
+
+
+def _search(
+    studies: list[Study],
+    tolerance: float,
+    by: Any,
+    vary: dict[str, Iterable[Any]],
+    reference: Any,
+    margin: float,
+    repeats: int,
+    show: Callable[[Trial], None] | None,
+) -> Tuned:
+    """The best of the studies of one scene (see :func:`tune`)."""
+    tolerance = validate.number(OWNER, "error", tolerance, above=0.0)
+    margin = validate.number(OWNER, "margin", margin, above=0.0, maximum=1.0)
+    validate.whole(OWNER, "repeats", repeats, minimum=1)
+    first = studies[0]
+    ladders, substeps, polish = _ladders(first, vary)
+    references = [reference] * len(studies)
+    if reference is None and (by == "converged" or (by is None and not first.known_here)):
+        finest = _finest(ladders, first.settings)
+        references = [settled(each, finest, tolerance) for each in studies]
+        by = "converged"
     bench = Bench(studies, by, references, show)
-    search = Search(bench, margin * tolerance, ladders, substeps)
-    search.run(first.settings.substeps)
-    if search.best is None:
+    best = Search(bench, margin * tolerance, ladders, substeps).run(first.settings.substeps)
+    if best is None:
         least = min((each.bound for each in bench.trials), default=math.inf)
         raise validate.fail(
             OWNER, "error", f"be at least {least / margin:.3g}, the smallest found over margin",
             tolerance, "allow more, or vary what the error depends on",
         )  # fmt: skip
-    best = _polished(bench, search.best, polish, margin * tolerance, repeats)
     return Tuned(
-        scene=first.label, tolerance=tolerance, measure=bench.words, best=best,
-        trials=tuple(bench.trials), seeds=len(studies), device=_device(first),
+        scene=first.label, tolerance=tolerance, measure=bench.words,
+        best=_polished(bench, best, polish, margin * tolerance, repeats),
+        trials=tuple(bench.trials), seeds=len(studies), device=bench.device,
     )  # fmt: skip
 
 
 def _ladders(
-    study: Study, vary: dict[str, Any]
+    study: Study, given: dict[str, Iterable[Any]]
 ) -> tuple[dict[str, list[Any]], list[int], dict[str, list[Any]]]:
     """Values of modes, substeps to choose from, and values of knobs that are but polish."""
-    settings = study.settings
-    for name, values in vary.items():
-        if isinstance(values, str) or not isinstance(values, Iterable) or not list(values):
-            raise validate.fail(
-                OWNER, f"vary[{name!r}]", "be a list of values", values, "put it in a list"
-            )
-    vary = {name: list(values) for name, values in vary.items()}
+    settings, vary = study.settings, study.lists(given)
     study.split({name: values[0] for name, values in vary.items()}, "vary")
     start = {name: values[0] for name, values in vary.items() if name != "substeps"}
     sim = study.simulation(study.plan(start))
@@ -144,22 +139,17 @@ def _ladders(
         polish["skin"] = [float(f"{share * cutoff:.3g}") for share in SKINS]
     polish["compensated"] = [not settings.compensated]
     polish = {name: vary.pop(name, values) for name, values in polish.items()}
-    given = vary.pop("substeps", None)
-    if given is None:
+    substeps = vary.pop("substeps", None)
+    if substeps is None:
         needed = sim.stability().substeps
         least = int(needed) if math.isfinite(needed) else settings.substeps
-        given = levels(least, max(FINEST * least, settings.substeps))
-    return {**found, **vary}, sorted({int(each) for each in given}), polish
+        substeps = levels(least, max(FINEST * least, settings.substeps))
+    return {**found, **vary}, sorted({int(each) for each in substeps}), polish
 
 
 def _first(value: Any, values: Iterable[Any]) -> list[Any]:
     """``values`` with the one that is set in front."""
     return [value, *(each for each in values if each != value)]
-
-
-def _converges(study: Study, by: Any) -> bool:
-    """Whether the error is the distance from a reference."""
-    return by == "converged" or (by is None and not study.known_here)
 
 
 def _finest(ladders: Mapping[str, list[Any]], settings: Settings) -> dict[str, Any]:
@@ -169,9 +159,8 @@ def _finest(ladders: Mapping[str, list[Any]], settings: Settings) -> dict[str, A
         finest["integrator"] = "velocity_verlet"
     if "iterations" in ladders:
         finest["iterations"] = max(ladders["iterations"])
-    knobs = {field.name for field in dataclasses.fields(Settings)}
     for name, values in ladders.items():
-        if name not in knobs:
+        if name not in KNOBS:
             if len(values) > 1:
                 raise validate.fail(
                     OWNER, "by", f"be a function of the simulation where {name} varies",
@@ -196,11 +185,6 @@ def _polished(
         if trial.bound <= target:
             return dataclasses.replace(trial, cost=costs[k])
     return dataclasses.replace(best, cost=costs[0])
-
-
-def _device(study: Study) -> str:
-    sim: Simulation = study.simulation(study.plan({}))
-    return str(sim.device)
 
 
 def _print(trial: Trial) -> None:

@@ -2,9 +2,8 @@
 
 :func:`launch` runs a kernel at once, or appends it to the :class:`Program` that is being recorded.
 A program is a flat list of launches, host calls and conditional parts; the simulation records one
-substep and replays it. Every kernel takes ``first: int`` as its first argument and adds it to
-``wp.tid()``, so that a launch can be cut into chunks. A kernel writes only its own rows, hence the
-result does not depend on how it is cut: graph, threads and any number of them agree bit for bit.
+substep and replays it. However a launch is cut, the result is the same: graph, threads and any
+number of them agree bit for bit.
 """
 
 from __future__ import annotations
@@ -118,7 +117,39 @@ def owner(name: str) -> Iterator[None]:
 
 
 def launch(kernel: Any, dim: int, inputs: Sequence[Any], device: Any) -> None:
-    """Launch ``kernel`` over ``dim`` rows with ``inputs`` after its ``first`` argument."""
+    """Launch a kernel over ``dim`` rows: now, or each time that what is being recorded is run.
+
+    This is how an interaction, a constraint or an integrator of your own runs a kernel in its
+    ``apply``, ``project`` or ``advance``: the launch becomes part of the frame, which is recorded
+    once and then replayed, as a graph or by threads.
+
+    The kernel's first argument is ``first: int``, which it adds to ``wp.tid()`` for the number of
+    its row. Threads share a launch by cutting it into chunks, each a launch from another ``first``,
+    and ``wp.tid()`` counts from 0 in every one of them. Chunks run in any order and at once, so a
+    thread writes its own row only, or what every thread would write the same; it reads what it
+    likes of arrays that the launch does not write. Atomics are no way out: on a CPU they are plain
+    additions.
+
+    In a frame, ``inputs`` are taken as they are when it is recorded: numbers keep their values, and
+    arrays must stay where they are and be written in place. Nothing runs until the frame does, so
+    there is nothing to read back in between (``.numpy()``), and nothing is to be allocated.
+
+    Args:
+        kernel: Made by ``wp.kernel``. Its arguments are ``first`` and then those of ``inputs``.
+        dim: Rows; nothing happens for 0.
+        inputs: What the kernel takes after ``first``: arrays, structs, numbers.
+        device: Where the arrays are: ``model.device``.
+
+    Example:
+        >>> @wp.kernel
+        ... def lift(first: int, speed: float, velocity: wp.array(dtype=wp.vec3)):
+        ...     i = first + wp.tid()
+        ...     velocity[i] = velocity[i] + wp.vec3(0.0, speed, 0.0)
+        >>> velocity = wp.zeros(2, dtype=wp.vec3, device="cpu")
+        >>> launch(lift, 2, [0.5, velocity], "cpu")
+        >>> velocity.numpy().tolist()
+        [[0.0, 0.5, 0.0], [0.0, 0.5, 0.0]]
+    """
     if dim == 0:
         return
     operation = Launch(kernel, dim, inputs, device, _owners[-1])

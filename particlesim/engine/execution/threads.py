@@ -1,4 +1,4 @@
-"""A team of threads that share chains of recorded launches (see :mod:`particlesim.kernels.engine.team`).
+"""A team of threads that share chains of launches (see :mod:`particlesim.kernels.engine.team`).
 
 Between two shared launches lie tens of microseconds, and waking a thread that sleeps takes
 hundreds. So a worker looks for the next launch in native code for some milliseconds before it goes
@@ -7,7 +7,8 @@ to sleep.
 
 from __future__ import annotations
 
-import ctypes
+import functools
+import itertools
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -17,6 +18,8 @@ import numpy as np
 import warp as wp
 
 from ...kernels.engine.team import LEAVE, LEFT, POSTS, RING, STAGE, serve_kernel, share_kernel
+from ...kernels.self_check import fast_ways
+from ...kernels.warp_internals import Packed
 
 # A worker looks for work for about five milliseconds. The caller, who waits for the workers, looks
 # for a shorter while and then lets others run: one of them may be the worker that it waits for.
@@ -24,32 +27,39 @@ WORKER_LOOKS, CALLER_LOOKS = 10_000_000, 100_000
 
 
 class Chain:
-    """Launches packed for native code, one stage each: entry point, bounds and arguments.
+    """Launches that follow one another, one stage each.
 
     Args:
         stages: ``wp.Launch`` commands on the CPU, a list for each stage: the chunks of a launch.
     """
 
     def __init__(self, stages: Sequence[Sequence[Any]]):
-        self._kept = []  # what the tables point to
-        table = []
-        for commands in stages:
-            packed = [_packed(command) for command in commands]
-            chunks = np.array([addresses for addresses, _ in packed], dtype=np.uint64)
-            self._kept.append((packed, chunks))
-            table.append((chunks.ctypes.data, len(chunks)))
-        self.table = np.array(table, dtype=np.uint64)
+        self.stages = stages
+
+    @functools.cached_property
+    def table(self) -> np.ndarray:
+        """For native code: the address of each stage's packed chunks, and their number."""
+        self._packed = [[Packed(command) for command in stage] for stage in self.stages]
+        self._chunks = [
+            np.array([each.addresses for each in packed], dtype=np.uint64)
+            for packed in self._packed
+        ]
+        table = [(chunks.ctypes.data, len(chunks)) for chunks in self._chunks]
+        return np.array(table, dtype=np.uint64)
 
 
 class Team:
-    """The calling thread and ``threads - 1`` workers.
+    """The calling thread and ``threads - 1`` workers; the former alone where Warp has changed.
 
     Args:
         threads: Threads in all, at least 1.
     """
 
     def __init__(self, threads: int):
-        self._board = _Board()
+        self.workers: list[threading.Thread] = []
+        self._board = _Board() if fast_ways() else None
+        if self._board is None:
+            return
         self._share = self._board.action(share_kernel(), CALLER_LOOKS, back=False)
         # Recorded here: Warp compiles on one thread. The workers know the board only, so that the
         # team can be let go.
@@ -66,15 +76,20 @@ class Team:
 
     def run(self, chain: Chain) -> None:
         """Run all stages in turn, each by whoever is free, and return when all are done."""
+        if self._board is None:
+            for command in itertools.chain(*chain.stages):
+                command.launch()
+            return
         self._board.offer(chain)
+        words = self._board.words
         try:
-            self._finish()
+            self._finish(words)
         except BaseException:  # an interrupt: no chunk may be under way when the next chain comes
-            self._finish()
+            self._finish(words)
             raise
 
-    def _finish(self) -> None:
-        words, share = self._board.words, self._share
+    def _finish(self, words: np.ndarray) -> None:
+        share = self._share
         share()
         while words[LEFT]:
             time.sleep(0)
@@ -82,7 +97,8 @@ class Team:
 
     def close(self) -> None:
         """Send the workers home."""
-        self._board.close()
+        if self._board is not None:
+            self._board.close()
 
     def __del__(self) -> None:
         self.close()
@@ -102,13 +118,7 @@ class _Board:
         """One of the team's kernels as a function; chunks are taken from front or back."""
         inputs = [0, self.memory, looks, int(back)]
         command = wp.launch(kernel, 1, inputs, device="cpu", record_cmd=True)
-        (entry, bounds, arguments), kept = _packed(command)
-        call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(entry)
-
-        def act(_kept: Any = kept) -> None:
-            call(bounds, arguments)
-
-        return act
+        return Packed(command).function()
 
     def offer(self, chain: Chain) -> None:
         """Lay out the stages; nothing of an earlier chain is still under way."""
@@ -135,17 +145,3 @@ def _work(board: _Board, serve: Callable[[], None]) -> None:
             if board.posts == seen and not board.words[LEAVE]:
                 board.awake.wait()
             board.asleep -= 1
-
-
-def _packed(command: Any) -> tuple[tuple[int, int, int], Any]:
-    """Addresses of a command's entry point, bounds and arguments, and what must live as long.
-
-    A compiled CPU kernel is a function of two pointers: the bounds, and a struct of its arguments.
-    """
-    bounds, *values = command.params
-    names = [argument.label for argument in command.kernel.adj.args]
-    kinds = list(zip(names, map(type, values), strict=True))
-    arguments = type("Arguments", (ctypes.Structure,), {"_fields_": kinds})(*values)
-    entry = ctypes.cast(command.hooks.forward, ctypes.c_void_p).value or 0
-    addresses = (entry, ctypes.addressof(bounds), ctypes.addressof(arguments))
-    return addresses, (command, bounds, arguments)

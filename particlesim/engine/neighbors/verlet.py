@@ -15,7 +15,9 @@ import warp as wp
 
 from ... import validate
 from ...kernels.engine import neighbors as kernels
+from ...kernels.engine import rows
 from ...kernels.engine.loops import ROWS
+from ...kernels.warp_internals import grid_shape
 from ..execution.launch import call, launch, when
 from ..model import Model
 from ..state import State
@@ -75,7 +77,7 @@ class VerletList(AllPairs):
         self.overflow = wp.zeros(1, dtype=wp.int32, device=device)
         self.pairs.count = wp.zeros(self.count, dtype=wp.int32, device=device)
         super().allocate(state)
-        self.planes = wp.zeros((3, self.count + kernels.BLOCK), dtype=real, device=device)
+        self.planes = wp.zeros((3, self.count + rows.BLOCK), dtype=real, device=device)
         start = state["position"].numpy()[self.members_host].astype(np.float64)
         for w in self.grid_worlds:
             self.grids[w] = self.grid_over(w, start[self.begin_host[w] : self.end_host[w]])
@@ -132,8 +134,8 @@ class VerletList(AllPairs):
 
     def _resize(self, capacity: int) -> None:
         """Rows for ``capacity`` neighbours; contiguous if vectorised, else interleaved for CUDA."""
-        stride = -(-(capacity + kernels.SPARE) // 16) * 16
-        self.capacity = stride - kernels.SPARE
+        stride = -(-(capacity + rows.SPARE) // 16) * 16
+        self.capacity = stride - rows.SPARE
         self.generation += 1
         self.index = wp.zeros(self.count * stride, dtype=wp.int32, device=self.model.device)
         pairs = self.pairs
@@ -198,20 +200,20 @@ class VerletList(AllPairs):
         model, device = self.model, self.model.device
         grid, place = self.grids[w]
         begin, count = int(self.begin_host[w]), int(self.end_host[w] - self.begin_host[w])
-        steps = kernels.build_kernels(model.precision)
         u = self.cell_coordinate[begin : begin + count]
-        launch(steps.cell_coordinates, count, [place, self.x_listed, self.cell_coordinate], device)
+        to_cells = kernels.cell_coordinates_kernel(model.precision)
+        launch(to_cells, count, [place, self.x_listed, self.cell_coordinate], device)
         call(lambda: grid.build(u, 1.0))
         launch(
-            steps.sort_slots,
+            kernels.build_kernels(model.precision).sort_slots,
             count,
             [grid.id, place, self.members, self.x_listed, self.order, self.slot,
              self.planes],
             device,
         )  # fmt: skip
-        rows = kernels.grid_rows_kernel(model.precision, model.periodic, model.vectorised)
+        make = rows.grid_rows_kernel(model.precision, model.periodic, model.vectorised)
         launch(
-            rows,
+            make,
             count,
             [grid.id, place, model.box, self.reach_squared, self.slot, self.planes,
              self.pairs, self.overflow],
@@ -222,9 +224,9 @@ class VerletList(AllPairs):
         model = self.model
         spread = kernels.build_kernels(model.precision).spread
         launch(spread, self.count, [self.x_listed, self.planes], model.device)
-        rows = kernels.direct_rows_kernel(model.precision, model.periodic, model.vectorised)
+        make = rows.direct_rows_kernel(model.precision, model.periodic, model.vectorised)
         launch(
-            rows,
+            make,
             self.count,
             [self.direct, model.box, self.reach_squared, self.moved, self.planes, self.pairs,
              self.overflow],
@@ -250,7 +252,7 @@ class VerletList(AllPairs):
         return grown
 
     def describe(self) -> str:
-        grids = [f"{g._dim_x} x {g._dim_y} x {g._dim_z}" for g, _ in self.grids.values()]
+        grids = ["{} x {} x {}".format(*grid_shape(grid)) for grid, _ in self.grids.values()]
         how = f"hash grid {grids[0]}" if grids else "direct search"
         how += f" and {len(grids) - 1} more" if len(grids) > 1 else ""
         mean = np.minimum(self.pairs.count.numpy(), self.capacity).sum() / max(1, self.count)

@@ -35,8 +35,9 @@ from ...engine.loop import Loop
 from ...engine.model import Model
 from ...engine.observers import FORCE, PROJECT, Observer
 from ...engine.state import State
+from ...engine.structs import filled
 from ...kernels.engine.copy import copy_kernel, zero_kernel
-from ...kernels.instruments.ledger import TOTALS, account_kernel, change_kernel
+from ...kernels.instruments.ledger import TOTALS, account_kernel, change_kernel, ledger_type
 from ..diagnostics import blocks
 
 BLOCK_CPU, BLOCK_CUDA = 256, 16  # particles that a thread sums
@@ -62,8 +63,13 @@ class Accounts(Observer):
         self.halves = loop.integrator.carries_forces  # kicks at both ends of a substep
         size = BLOCK_CPU if model.device.is_cpu else BLOCK_CUDA
         begin, end, self.world = blocks(model.offsets, size)
-        self._blocks = [model.array(each, wp.int32) for each in (begin, end)]
         self.x0, self.v0, self.seen = (self._rows() for _ in range(3))
+        arrays = {
+            "begin": model.array(begin, wp.int32), "end": model.array(end, wp.int32),
+            "m": state.mass, "w": state.inverse_mass, "x0": self.x0, "v0": self.v0,
+            "x": state.position, "v": state.velocity,
+        }  # fmt: skip
+        self.read = filled(ledger_type(model.precision), arrays)
         self.accounts = [self._open(part, True) for part in loop.interactions]
         self.accounts += [self._open(part, False) for part in loop.constraints]
         self.start = wp.zeros(model.world_count, dtype=TOTALS, device=model.device)
@@ -104,14 +110,11 @@ class Accounts(Observer):
             launch(change_kernel(self.model.precision), len(change), inputs, self.model.device)
 
     def end(self, dt: float) -> None:
-        state = self.state
         with owner("ledger"):
             for each in self.accounts:
                 early, late = self._scales(each, dt)
                 inputs = [
-                    *self._blocks, state.mass, state.inverse_mass, self.x0, self.v0, state.position,
-                    state.velocity, each.early, each.late, early, late, int(not each.acts),
-                    each.totals,
+                    self.read, each.early, each.late, early, late, int(not each.acts), each.totals,
                 ]  # fmt: skip
                 kernel = account_kernel(self.model.precision)
                 launch(kernel, len(each.totals), inputs, self.model.device)

@@ -8,7 +8,10 @@ import weakref
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from ... import validate
+from ...constraints.constraint import Constraint
 from ...engine.loop import Loop
 from ...engine.probing.limit import Limit, explicit_step
 from ...engine.probing.probe import Probe
@@ -16,9 +19,10 @@ from ...interactions.fusion import fuse
 from ...scene.scene import Scene
 from ...scene.settings import AUTO, Settings
 from .report import Stability
-from .start import misfit
 
 PROVISIONAL = 1.0 / 60.0  # a frame's time while it is yet to be found
+MANY = 10.0  # times the speed that anything has, or gains in a frame
+FEW = 1e-4  # of the size of the scene: what rounding and stretched springs may be off
 NEGLIGIBLE = 0.97  # of the tightest limit: what several parts do together matters below it
 
 _checked: weakref.WeakSet[Loop] = weakref.WeakSet()
@@ -102,3 +106,34 @@ def automatic(scenes: Sequence[Scene], settings: Settings, device: Any) -> Setti
     if of_frame:
         return settings.replace(dt=settings.substeps * limit)
     return settings.replace(substeps=max(1, math.ceil(settings.dt / limit * (1.0 - 1e-9))))
+
+
+def misfit(loop: Loop) -> str:
+    """What is to be said of a start that violates constraints of tuples; empty if nothing is.
+
+    A correction dx of the first substep becomes the speed dx / dt, the larger the finer the
+    substep. It is said of the particle that gets most, if that is more than ten times what moves
+    in the scene anyway. (Contacts and boundaries bring in what overlaps at a bounded speed.)
+    """
+    parts = [part for part in loop.constraints if isinstance(part, Constraint) and part.count]
+    dt = loop.settings.substep
+    if not parts or not dt > 0:
+        return ""
+    with Probe(loop) as probe:
+        x, v, a = probe.position, probe.velocity, probe.acceleration
+        usual = np.linalg.norm(v, axis=1).max() + loop.settings.dt * np.linalg.norm(a, axis=1).max()
+        size = np.ptp(x, axis=0).max()
+        for part in parts:
+            part.begin(loop.state, loop.neighbors, dt)
+            part.project(loop.state, loop.neighbors, dt)
+            moved = np.linalg.norm(loop.get("position").astype(np.float64) - x, axis=1)
+            row = int(np.argmax(moved))
+            if moved[row] > FEW * size and moved[row] > MANY * usual * dt:
+                world, particle = probe.place(row)
+                where = f"particle {particle}" + (f" in world {world}" if world else "")
+                return (
+                    f"Simulation: the start must fit {part.name}, got {where} moved by "
+                    f"{moved[row]:.3g} in the first substep, which gives it {moved[row] / dt:.3g} "
+                    "length/s; call sim.project(iterations) first, or place it better."
+                )
+    return ""

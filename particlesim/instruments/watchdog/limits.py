@@ -3,7 +3,7 @@
 Fast: |v| beyond sqrt(F) times the *pace* of the world, on any axis. The pace is the fastest start,
 or the extent of the start a frame, whichever is more; F is ``Settings.energy_growth``. In terms of
 energy: that of a particle is F times the largest there was cause for, and F times that of crossing
-the whole scene within a frame. A world may have cause for it (see :mod:`.audit`); its
+the whole scene within a frame. A world may have cause for it (see :mod:`.trace`); its
 pace is raised then.
 
 Far: outside ``Scene(bounds=...)``; or where the last bit of a coordinate is more than half the skin

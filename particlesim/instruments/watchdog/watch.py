@@ -22,10 +22,9 @@ from ...engine.neighbors.lists import Neighbors
 from ...engine.state import State
 from ...kernels.instruments.watchdog import check_kernel, hold_kernel
 from ..diagnostics import blocks
-from .audit import causes
 from .incident import Incident, SimulationError, SimulationWarning
 from .limits import ESCAPED, FAST, FINITE, Limits
-from .trace import Culprit, survey, trace
+from .trace import Culprit, causes, survey, trace
 
 KINDS = {FINITE: "not finite", ESCAPED: "escaped", FAST: "runaway"}
 BLOCK_CPU, BLOCK_CUDA = 256, 8  # particles that a thread looks at

@@ -10,6 +10,7 @@ import warp as wp
 from ... import validate
 from ...engine.execution.launch import launch
 from ...engine.model import Model
+from ...kernels.engine.neighbors import cell_coordinates_kernel
 from ...kernels.interactions import sph as kernels
 from .sph import SPH
 
@@ -77,7 +78,7 @@ def _sums(sph: SPH, world: int, slots: slice, where: np.ndarray, samples: np.nda
     # Points out of reach look into the outermost cells, so that cell numbers stay small.
     reach = 1.1 * sph.pairs.reach[world]
     near = np.clip(points.numpy(), host.min(axis=0) - reach, host.max(axis=0) + reach)
-    to_cells = kernels.cell_coordinates_kernel(precision)
+    to_cells = cell_coordinates_kernel(precision)
     u_particles, u_points = wp.empty_like(x), wp.empty_like(points)
     launch(to_cells, len(x), [cells, x, u_particles], device)
     launch(to_cells, len(near), [cells, model.array(near, precision.vec3), u_points], device)

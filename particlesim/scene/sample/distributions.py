@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ... import validate
-from .arguments import corners, make_generator
+from .arrange import corners, make_generator
 
 # Darts that miss in a row before a box counts as full.
 MISSES_ALLOWED = 20_000

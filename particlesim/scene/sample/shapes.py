@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ... import validate
-from .arguments import corners, make_generator
+from .arrange import corners, make_generator
 
 # Positions of the atoms in one cell, as fractions of the cell, and the cell's sides in units of
 # the lattice constant. The cell of hcp is the orthorhombic one, with the ideal c/a = sqrt(8/3).

@@ -1,0 +1,230 @@
+"""What rests on Warp's insides, all of it: elsewhere only Warp's public interface is used.
+
+Every function says which private facts of ``WRITTEN_FOR`` it rests on. Each fact has a test, which
+fails first on a Warp that has changed it (tests/kernels/test_warp_*.py), and
+:mod:`particlesim.kernels.self_check` tries the fast ways that are built on them once a process.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import inspect
+import linecache
+import textwrap
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import warp as wp
+
+WRITTEN_FOR = "1.19"  # of warp-lang
+
+# Functions by name ------------------------------------------------------------------------------
+
+_FUNCTIONS: dict[tuple[Any, ...], wp.Function] = {}
+
+
+def named_function(
+    func: Callable[..., Any],
+    name: str,
+    *,
+    annotations: Mapping[str, Any] | None = None,
+    source: str | None = None,
+    snippet: str | None = None,
+    after_gradients: bool = False,
+) -> wp.Function:
+    """The Warp function of that name in native code, the same one for the same name.
+
+    A kernel that calls what is one function by content gets its definition once, also where two
+    users made it, each for themselves. ``wp.func`` would number its native names by the order of
+    creation: native code could not call them, and the cache of kernels on disk would miss whenever
+    that order changed.
+
+    Rests on: the arguments of ``wp.Function``; that ``native_func`` is the name of the generated
+    C++ function, unchanged; that a function's module emits C++ forward functions first, then
+    adjoints, then the functions marked ``adj.uses_grad_call``, each group in the order in which
+    they were first called; that a native function's stub is read like any body, so that what it
+    calls is emitted before it; that its return type counts only where its source begins with
+    Warp's decorator.
+
+    Args:
+        func: Python function; of a native one the stub, which calls what the snippet calls.
+        name: Name in native code. It must tell apart what differs, as a hash of the content does.
+        annotations: Types of the arguments, in place of those written.
+        source: What Warp reads in place of the function's own source.
+        snippet: C++ in place of a body.
+        after_gradients: Emitted with the functions that use ``wp.grad``, behind the adjoints that
+            those call: needed by whoever calls one of them by name.
+    """
+    key = (name, func.__module__, after_gradients)
+    if key not in _FUNCTIONS:
+        if snippet is not None:
+            source = "@wp.func_native()\n" + textwrap.dedent(inspect.getsource(func))
+        made = wp.Function(
+            func, key=func.__name__, namespace="", native_func=name, native_snippet=snippet,
+            module=wp.get_module(func.__module__), overloaded_annotations=annotations,
+            source=source,
+        )  # fmt: skip
+        made.adj.uses_grad_call = after_gradients
+        _FUNCTIONS[key] = made
+    return _FUNCTIONS[key]
+
+
+def is_after_gradients(value: Any) -> bool:
+    """Whether it is a function emitted behind the adjoints. Rests on: ``adj.uses_grad_call``."""
+    return getattr(getattr(value, "adj", None), "uses_grad_call", False)
+
+
+def native_name(function: wp.Function) -> str:
+    """Name of a function in native code. Rests on: ``Function.native_func``."""
+    return function.native_func
+
+
+def written_in_python(value: Any) -> Callable[..., Any] | None:
+    """The Python function that a Warp function was made of; None: made of anything else.
+
+    Rests on: ``Function.func`` and ``Function.native_snippet``.
+    """
+    if isinstance(value, wp.Function) and value.native_snippet is None:
+        return value.func
+    return None
+
+
+def argument_names(function: wp.Function) -> tuple[str, ...]:
+    """Names of a function's arguments. Rests on: ``Function.input_types``."""
+    return tuple(function.input_types)
+
+
+def compiled(source: str, name: str, scope: dict[str, Any]) -> Callable[..., Any]:
+    """The function ``name`` of generated source, which Warp can read again.
+
+    Rests on: Warp reads sources by ``inspect``, which asks ``linecache``.
+    """
+    filename = f"<particlesim {name} {digest(source)}>"
+    scope = dict(scope)
+    exec(compile(source, filename, "exec"), scope)
+    linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
+    return scope[name]
+
+
+def digest(*parts: Any) -> str:
+    """Hash of values by what they are, the same in every process.
+
+    Rests on: ``Struct.key`` and ``Struct.hash``; that vector and matrix types share one Python
+    name, and tell their length and precision by ``_wp_scalar_type_`` and ``_shape_``.
+    """
+
+    def text(value: Any) -> str:
+        if isinstance(value, wp.Function):
+            return native_name(value)
+        if wp.types.type_is_struct(value):
+            return value.key + value.hash.hex()
+        if isinstance(value, wp.array):
+            return f"array{value.ndim} of {text(value.dtype)}"
+        if hasattr(value, "_wp_scalar_type_") and isinstance(value, type):
+            kind = (value._wp_generic_type_str_, value._wp_scalar_type_, value._shape_)
+            return f"{kind[0]} of {kind[1].__name__} {kind[2]}"
+        return str(getattr(value, "__qualname__", value))
+
+    return hashlib.sha256("|".join(map(text, parts)).encode()).hexdigest()[:12]
+
+
+# Packed launches --------------------------------------------------------------------------------
+
+# C++: run the launch whose three addresses ``packed`` points to.
+RUN_PACKED = "((void (*)(void*, void*))packed[0])((void*)packed[1], (void*)packed[2])"
+
+
+class Packed:
+    """A recorded CPU launch as three addresses: entry point, bounds and arguments.
+
+    Rests on: ``Launch.hooks.forward``, a ctypes function of two pointers that returns nothing;
+    ``Launch.params``, the bounds and then the arguments as ctypes; that the second pointer is to a
+    struct of those arguments in the order of ``kernel.adj.args``.
+
+    Args:
+        command: Of ``wp.launch(..., device="cpu", record_cmd=True)``.
+
+    Raises:
+        RuntimeError: The kernel is not loaded: it has no entry point.
+    """
+
+    def __init__(self, command: wp.Launch):
+        bounds, *values = command.params
+        names = [argument.label for argument in command.kernel.adj.args]
+        kinds = list(zip(names, map(type, values), strict=True))
+        arguments = type("Arguments", (ctypes.Structure,), {"_fields_": kinds})(*values)
+        entry = command.hooks.forward and ctypes.cast(command.hooks.forward, ctypes.c_void_p).value
+        if not entry:
+            raise RuntimeError(
+                f"Launch: kernel {command.kernel.key} must have an entry point, got none; Warp has "
+                "not loaded its module: clear Warp's kernel cache and start again."
+            )
+        self.addresses = (entry, ctypes.addressof(bounds), ctypes.addressof(arguments))
+        self._kept = (command, bounds, arguments)  # what the addresses point to
+
+    def function(self) -> Callable[[], None]:
+        """The launch as a function to call, which lets go of Python's lock."""
+        entry, bounds, arguments = self.addresses
+        call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(entry)
+
+        def run(_kept: Any = self._kept) -> None:
+            call(bounds, arguments)
+
+        return run
+
+
+# Native code ------------------------------------------------------------------------------------
+
+
+def elements(array: str, c: str) -> str:
+    """C++: pointer to the numbers of an array without gaps, of type ``c``.
+
+    Rests on: ``array_t::data``; that vectors are their components and nothing else.
+    """
+    return f"(({c}*){array}.data)"
+
+
+def columns(array: str) -> str:
+    """C++: length of the rows of a two-dimensional array. Rests on: ``array_t::shape``."""
+    return f"{array}.shape[1]"
+
+
+def vector(width: int, c: str) -> str:
+    """C++: type of a vector, made of its components and read by ``[]``. Rests on: its name."""
+    return f"wp::vec_t<{width},{c}>"
+
+
+def grid_runs(grid: str, point: str, c: str, visit: str) -> str:
+    """C++: ``visit`` for every run, from ``begin`` to ``end``, of the points around ``point``.
+
+    The points, in the order of ``wp.hash_grid_point_id``, of all cells that ``wp.hash_grid_query``
+    would look through for a radius of 1, whole runs of neighbouring cells at a time.
+
+    Rests on: the members of ``hash_grid_query_t`` and ``HashGrid_t``, and ``hash_grid_index``.
+    """
+    return f"""
+    auto around = wp::hash_grid_query({grid}, {point}, ({c})1);
+    const auto& g = around.grid;
+    const int first_x = ((around.x_start % g.dim_x) + g.dim_x) % g.dim_x;
+    for (int z = around.z_start; z <= around.z_end; ++z)
+    for (int y = around.y_start; y <= around.y_end; ++y) {{
+        // Cells along x follow each other in the sorted order, but for the wrap: scan whole runs.
+        const int line = wp::hash_grid_index(g, 0, y, z);
+        int begin = 0, end = 0;
+        for (int cell = around.x_start, at = first_x; cell <= around.x_end; ++cell) {{
+            const int from = g.cell_starts[line + at], to = g.cell_ends[line + at];
+            at = at + 1 < g.dim_x ? at + 1 : 0;
+            if (from == to) continue;
+            if (from == end) {{ end = to; continue; }}
+            {visit}
+            begin = from; end = to;
+        }}
+        {visit}
+    }}
+"""
+
+
+def grid_shape(grid: wp.HashGrid) -> tuple[int, int, int]:
+    """Cells of a hash grid along its axes. Rests on: ``HashGrid._dim_x`` and so on."""
+    return grid._dim_x, grid._dim_y, grid._dim_z

@@ -1,0 +1,76 @@
+"""Tables of sweeps: their text, their numbers, and the files they are written to."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from .. import validate
+from ..output.files import whole
+
+
+def grid(heads: Iterable[tuple[str, Any]], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Lines of columns; a head is a name, and ``"left"`` or ``"right"``."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE, show_edge=False, pad_edge=False)
+    for name, justify in heads:
+        table.add_column(name, justify=justify)
+    for row in rows:
+        table.add_row(*row)
+    stream = io.StringIO()
+    console = Console(file=stream, width=1000, color_system=None, markup=False, highlight=False)
+    console.print(table)
+    return [line.rstrip() for line in stream.getvalue().splitlines()]
+
+
+def shown(value: Any, digits: int = 3) -> str:
+    """A value as text; ``digits`` of a float."""
+    return f"{value:.{digits}g}" if isinstance(value, float) else str(value)
+
+
+def assignments(values: Mapping[str, Any], digits: int) -> str:
+    """Values as ``substeps=5, precision=float32``."""
+    return ", ".join(f"{name}={shown(value, digits)}" for name, value in values.items())
+
+
+def amount(value: float, step: int = 1000) -> str:
+    """A number with a prefix, as ``1.23 M``."""
+    if not math.isfinite(value):
+        return "-"
+    for prefix in ("", "k", "M", "G"):
+        if abs(value) < 999.5 or prefix == "G":
+            break
+        value /= step
+    binary = "i" if prefix and step == 1024 else ""
+    return f"{value:.3g} {prefix.upper() if binary else prefix}{binary}"
+
+
+def check_new(
+    owner: str,
+    argument: str,
+    path: Path,
+    formats: Sequence[str],
+    overwrite: bool,
+    consent: str = "overwrite it",
+) -> None:
+    """Refuse a file of another suffix, and one that exists."""
+    if path.suffix.lower() not in formats:
+        raise validate.fail(
+            owner, argument, f"end in {', '.join(formats)}", str(path), "choose one of these"
+        )
+    if path.exists() and not overwrite:
+        raise validate.fail(
+            owner, argument, "be a new file", str(path), f"choose another or {consent}"
+        )
+
+
+def write(owner: str, path: Path, content: bytes) -> None:
+    """Write a file at once or not at all."""
+    with whole(owner, path, "What was there before is left as it is.") as part:
+        part.write_bytes(content)

@@ -1,0 +1,122 @@
+"""What particles are held off by their radius with: the engine's side of boundaries."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ..engine.execution.launch import call, launch
+from ..engine.model import Model
+from ..engine.neighbors.lists import Neighbors
+from ..engine.state import State
+from ..kernels.constraints import boundary as kernels
+from ..kernels.constraints.rigid_motion import motion_type, pose_kernel, pose_type
+from ..kernels.precision import Precision
+from .easing import EasedConstraint, Easing
+from .tuples import bodies
+
+
+class Holding(EasedConstraint):
+    """Base of :class:`~particlesim.constraints.boundary.Boundary`, which describes what holds."""
+
+    requires = frozenset({"position", "velocity", "inverse_mass", "radius", "correction"})
+    sides = 1  # at most how many of them a particle touches at once
+
+    def surface(self, precision: Precision) -> wp.Function:
+        """Where it is, as a Warp function (see kernels.constraints.boundary_shapes)."""
+        raise NotImplementedError
+
+    def prepare(self, model: Model, neighbors: Neighbors) -> None:
+        self.model = model
+        for w, peer in enumerate(self.peers):
+            peer._check(model, w)
+        members = model.members([peer.group for peer in self.peers], self.name)
+        self.count = len(members)
+        self.held = kernels.held_type(model.precision, self.sides)()
+        self.held.particle = model.array(members, wp.int32)
+        self.worlds_held = model.world_of[members]
+        self.held.world = model.array(self.worlds_held, wp.int32)
+        rows = [
+            {**peer._geometry(), "friction": peer.friction, "restitution": peer.restitution}
+            for peer in self.peers
+        ]
+        columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        self.Params, self.params = model.parameters(f"{type(self).__name__}Parameters", columns)
+        self.rough, self.bouncing = columns["friction"].any(), columns["restitution"].any()
+        self.moving = any(peer.moves for peer in self.peers)
+        if self.moving:
+            self.requires = self.requires | {"time"}
+
+    def attach(self, model: Model, state: State) -> None:
+        if not self.count:
+            return
+        device, precision = model.device, model.precision
+        each = precision.vector(self.sides)
+        self.bodies = bodies(model, state)
+        self.easing = Easing(model, self.count, each, ends=1)
+        self.held.radius = state.radius
+        self.held.slack, self.held.marked = self.easing.slack, self.easing.marked
+        if self.rough:
+            self.held.grip = wp.zeros(self.count, dtype=each, device=device)
+        if self.moving:
+            self._attach_motion(state)
+        forces = "force" in state
+        self.force = state.force if forces else wp.empty(0, dtype=precision.vec3, device=device)
+        self.form = kernels.Form(
+            self.surface(precision), self.sides, precision, self.Params, "position_error" in state,
+            self.moving,
+        )  # fmt: skip
+        self.begin_kernel = kernels.begin_kernel(self.form)
+        self.project_kernel = kernels.project_kernel(self.form)
+        self.bounce_kernel = kernels.bounce_kernel(self.form, forces)
+
+    def _attach_motion(self, state: State) -> None:
+        """The motions of all worlds, and room for where they have led."""
+        model = self.model
+        carried = [peer._carried() for peer in self.peers]
+        columns = {
+            "velocity": [peer.velocity for peer in self.peers],
+            "spin": [peer.angular_velocity for peer in self.peers],
+            "travel": [travel for travel, _ in carried],
+            "turn": [turn for _, turn in carried],
+            "pivot": [peer._pivot() for peer in self.peers],
+        }
+        self.motion = model.structures(
+            motion_type(), {name: np.array(rows) for name, rows in columns.items()}
+        )
+        self.clock = state.time
+        self.held.pose = wp.zeros(
+            model.world_count, dtype=pose_type(model.precision), device=model.device
+        )
+
+    def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
+        return self.worlds_held if name == "slack" else super().worlds(name, array)
+
+    def _launch(self, kernel: wp.Kernel, *inputs: Any) -> None:
+        everything = [self.params, self.held, self.bodies, *inputs]
+        launch(kernel, self.count, everything, self.model.device)
+
+    def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        if not self.count or dt <= 0:
+            return
+        if self.moving:
+            # The clock goes with the positions: this is where the substep ends.
+            model = self.model
+            inputs = [self.motion, self.clock, self.held.pose]
+            launch(pose_kernel(model.precision), model.world_count, inputs, model.device)
+        # A static projection goes by the radii as they are, and leaves the marks to the first step.
+        if dt < math.inf:
+            self._launch(self.begin_kernel, self.easing.struct, dt)
+            call(self.easing.unmark)
+
+    def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        if self.count and dt > 0:
+            timed = dt < math.inf
+            self._launch(self.project_kernel, float(timed), dt if timed else 0.0)
+
+    def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        if self.count and self.bouncing and dt > 0:
+            self._launch(self.bounce_kernel, self.force, dt, 1.0 / dt)

@@ -1,0 +1,199 @@
+"""Every kernel compiles for CUDA, also on a machine without one.
+
+Simulations are built as they are for CUDA, with plain loops, but nothing is run: the kernels that
+they would launch are compiled to PTX. All ready scenes are built, and the scenes below, which hold
+what no ready scene does; a kernel that none of them launches fails the test.
+"""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+import warp as wp
+
+import particlesim as ps
+from particlesim import kernels
+from particlesim.commands.scene_files import load_scene, ready_scenes
+from particlesim.engine.execution import launch
+from particlesim.engine.execution.launch import Launch, Program
+from particlesim.engine.model import Model
+from particlesim.kernels.precision import KERNELS
+from particlesim.output.history.sample import sample
+from particlesim.pictures.render import renderer  # noqa: F401 - its kernels are to be compiled too
+
+ARCH = 90
+
+
+@ps.law
+def screened(r: float, charge_i: float, charge_j: float, screening: float, power: int):
+    return charge_i * charge_j * wp.exp(-r / screening) * wp.pow(r, float(power))
+
+
+@ps.law
+def repel(r: float, mass_j: float, radius_i: float, spin_j: wp.vec3):
+    return mass_j * radius_i * spin_j[0] / r
+
+
+@ps.law
+def swing(position: wp.vec3, velocity: wp.vec3, time: float, axis: wp.vec3):
+    return wp.cross(axis, velocity) - wp.sin(time) * position
+
+
+@ps.law
+def swing_energy(position: wp.vec3):
+    return 0.5 * wp.dot(position, position)
+
+
+@ps.law
+def flat(a: wp.vec3, b: wp.vec3, c: wp.vec3, area: float):
+    return 0.5 * wp.length(wp.cross(b - a, c - a)) - area
+
+
+def particles(count=600, periodic=None, **attributes):
+    scene = ps.Scene(periodic=periodic)
+    x = np.random.default_rng(0).uniform(0, 10, (count, 3))
+    scene.add_particles(x, radius=0.1, charge=1.0, spin=(0, 0, 1), **attributes)
+    return scene
+
+
+def forces():
+    scene = particles()
+    some = range(0, 600, 2)
+    scene.add_interaction(ps.LennardJones())
+    scene.add_interaction(ps.LennardJones(some, cutoff=2.5))
+    scene.add_interaction(ps.PairPotential(screened, cutoff=2.4, screening=1.0, power=2))
+    scene.add_interaction(ps.PairForce(repel, cutoff=1.0))
+    scene.add_interaction(ps.PairPotential(screened, cutoff=None, screening=1.0, power=-1))
+    scene.add_interaction(ps.Gravity(some))
+    scene.add_interaction(ps.Springs([(0, 1)], 1.0))
+    scene.add_interaction(ps.UniformGravity())
+    scene.add_interaction(ps.Drag(1.0))
+    scene.add_interaction(ps.ConstantForce((0, 1, 0)))
+    scene.add_interaction(ps.ParticleForce(swing, potential=swing_energy, axis=(0, 0, 1)))
+    return scene
+
+
+def few_forces(periodic, count):
+    scene = particles(count, periodic)
+    scene.add_interaction(ps.PairPotential(screened, cutoff=2.4, screening=1.0, power=2))
+    scene.add_interaction(ps.Springs([(0, 1)], 1.0))
+    return scene
+
+
+def fluid(periodic, **options):
+    scene = particles(periodic=periodic)
+    scene.add_interaction(
+        ps.SPH(smoothing_length=1.0, rest_density=1.0,
+               **{"equation_of_state": ps.Tait(10.0), **options})
+    )  # fmt: skip
+    return scene
+
+
+def constrained(periodic, *, breaks, bounces):
+    scene = particles(periodic=periodic)
+    limit = {"break_force": 1.0} if breaks else {}
+    triangle = ps.Constraint(flat, [(3, 4, 5)], area=1.0, inequality=True, **limit)
+    scene.add_constraint(ps.Distance([(0, 1), (1, 2)], compliance=1e-6, damping=0.1, **limit))
+    scene.add_constraint(triangle)
+    if not breaks:
+        scene.add_interaction(ps.Constraint(flat, [(6, 7, 8)], area=1.0, compliance=1e-3)
+                              .as_force())  # fmt: skip
+    touch = {"friction": 0.1, "restitution": 0.5} if bounces else {}
+    scene.add_constraint(ps.Contact(**touch))
+    if periodic is None:
+        scene.add_constraint(ps.PlaneBoundary((0, -9, 0), (0, 1, 0), **touch))
+        scene.add_constraint(ps.BoxBoundary((-9, -9, -9), (20, 20, 20), **touch))
+        scene.add_constraint(ps.SphereBoundary((0, 0, 0), 30.0, velocity=(1, 0, 0), **touch))
+    return scene
+
+
+BOX = ((0, 0, 0), (10, 10, 10))
+VERLET = {"integrator": "velocity_verlet"}
+SCENES = {
+    "gas": (lambda: particles(), {}),
+    "uncompensated_gas": (lambda: particles(), {"compensated": False}),
+    "forces": (forces, {}),
+    "periodic_forces": (lambda: few_forces(BOX, 600), VERLET | {"compensated": False}),
+    "small_periodic_world": (lambda: few_forces(BOX, 20), {}),
+    "fluid": (lambda: fluid(None, viscosity=ps.ArtificialViscosity(0.1)), {}),
+    "periodic_fluid": (
+        lambda: fluid(BOX, smoothing="cubic_spline", equation_of_state=ps.Polytrope(1.0, 1.5)), {}
+    ),
+    "constraints": (lambda: constrained(None, breaks=False, bounces=True), {"ledger": True}),
+    "breaking": (lambda: constrained(BOX, breaks=True, bounces=False), {"compensated": False}),
+    **{name: (lambda name=name: load_scene(name).build(), {}) for name in ready_scenes()},
+}  # fmt: skip
+
+EVERY_KERNEL = ("forces", "periodic_forces", "fluid", "constraints", "breaking", "star_collision")
+
+
+@pytest.fixture
+def launched(monkeypatch):
+    """The kernels that simulations launch; they are noted and not run."""
+    kernels = {}
+    make = Launch.__init__
+
+    def note(self, kernel, *rest):
+        kernels[kernel.module.name] = kernel
+        make(self, kernel, *rest)
+
+    monkeypatch.setattr(Launch, "__init__", note)
+    monkeypatch.setattr(Launch, "issue", lambda self: None)
+    monkeypatch.setattr(Model, "vectorised", False)
+    return kernels
+
+
+def simulate(name, precision):
+    build, knobs = SCENES[name]
+    sim = ps.Simulation(build(), ps.Settings(precision=precision, **knobs), device="cpu")
+    sim.watchdog.resume(sim.frames, [0])  # as if its only world were frozen
+    peak = sim.model.array(np.zeros(sim.particle_count), sim.model.precision.scalar)
+    sim.frames._record(sim.settings.substeps, peak)
+    sample(sim)
+    sim.project(1)
+    for interaction in sim.interactions:
+        if isinstance(interaction, ps.SPH):
+            with np.errstate(invalid="ignore"):  # densities were not computed
+                sim.interpolate(interaction, [(0, 0, 0)], "density")
+    for constraint in sim.constraints:
+        with launch.record(Program()):
+            constraint.reset([0])
+    return sim
+
+
+def compile_for_cuda(kernel, folder):
+    """None, or what is wrong."""
+    try:
+        wp.compile_aot_module(kernel.module, arch=ARCH, module_dir=folder, use_ptx=True)
+    except Exception as error:
+        return f"{kernel.key}: {error}"
+    return None
+
+
+def registered():
+    """Names of all kernels in the sources, but those that are for the CPU only."""
+    names = set()
+    for path in Path(kernels.__file__).parent.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef):
+                decorators = " ".join(map(ast.unparse, node.decorator_list))
+                if "register" in decorators and "cpu_only=True" not in decorators:
+                    names.add(node.name)
+    return names
+
+
+def test_every_kernel_compiles(precision, launched, tmp_path):
+    # All variants in float32, 0.15 s a kernel; in float64 one variant of each kernel at least.
+    for name in SCENES if precision == "float32" else EVERY_KERNEL:
+        simulate(name, precision)
+    # What draws is not part of a simulation; its kernels are made when their module is imported.
+    drawing = {kernel.module.name: kernel for kernel in KERNELS if "__locals__" not in kernel.key}
+    found = list((launched | drawing).values())
+    misplaced = [kernel.key for kernel in found if kernel not in KERNELS]
+    assert not misplaced, "these would be launched on CUDA, but are for the CPU only"
+    assert registered() - {kernel.key.rpartition("__")[2] for kernel in found} == set()
+    # Threads would not help: each makes a precompiled header of its own.
+    errors = [error for kernel in found if (error := compile_for_cuda(kernel, tmp_path))]
+    assert not errors
+    assert len(list(tmp_path.glob("*.ptx"))) == len(found) > 50

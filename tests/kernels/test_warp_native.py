@@ -1,0 +1,153 @@
+"""Launches packed for native code, and what native code knows of arrays and grids."""
+
+import ctypes
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import warp as wp
+
+from particlesim.kernels import warp_internals as internals
+from particlesim.kernels.precision import kernel, native
+
+# Packed launches --------------------------------------------------------------------------------
+
+
+@wp.struct
+class Mixed:
+    """Fields whose sizes ask for padding."""
+
+    flag: wp.int32
+    values: wp.array(dtype=wp.vec3d)
+    scale: wp.float64
+
+
+@kernel
+def scaled(
+    first: int, mixed: Mixed, shift: wp.float32, box: wp.mat33d, out: wp.array(dtype=wp.vec3d)
+):
+    i = first + wp.tid()
+    out[i] = box * mixed.values[i] * mixed.scale + wp.vec3d(wp.float64(shift))
+    if mixed.flag != 7:
+        out[i] = wp.vec3d()
+
+
+def scaled_launch():
+    """A launch of rows 2 to 4 of 5, its output and what it is to be."""
+    mixed, x = Mixed(), np.arange(15.0).reshape(5, 3)
+    mixed.flag, mixed.values, mixed.scale = 7, wp.array(x, dtype=wp.vec3d, device="cpu"), 0.25
+    out = wp.zeros(5, dtype=wp.vec3d, device="cpu")
+    inputs = [2, mixed, 0.5, wp.mat33d(*np.diag([1.0, 2.0, 4.0]).ravel()), out]
+    expected = np.where(np.arange(5)[:, None] < 2, 0.0, x * [0.25, 0.5, 1.0] + 0.5)
+    return wp.launch(scaled, 3, inputs, device="cpu", record_cmd=True), out, expected
+
+
+def test_a_packed_launch_is_the_launch():
+    command, out, expected = scaled_launch()
+    packed = internals.Packed(command)
+    packed.function()()
+    assert out.numpy().tolist() == expected.tolist()
+    out.zero_()
+    entry, bounds, arguments = packed.addresses
+    ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(entry)(bounds, arguments)
+    assert out.numpy().tolist() == expected.tolist()
+
+
+def test_native_code_runs_a_packed_launch():
+    command, out, expected = scaled_launch()
+
+    def run_it(launches: wp.array(dtype=wp.uint64)): ...
+
+    words = internals.elements("launches", "unsigned long long")
+    snippet = f"const unsigned long long* packed = {words}; {internals.RUN_PACKED};"
+    act = native(run_it, snippet)
+
+    @kernel
+    def run_packed(launches: wp.array(dtype=wp.uint64)):
+        act(launches)
+
+    packed = internals.Packed(command)
+    launches = wp.array(packed.addresses, dtype=wp.uint64, device="cpu")
+    wp.launch(run_packed, 1, [launches], device="cpu")
+    assert out.numpy().tolist() == expected.tolist()
+
+
+def test_a_kernel_without_an_entry_point_is_an_error():
+    command, _, _ = scaled_launch()
+    for nothing in (None, ctypes.CFUNCTYPE(None)(0)):
+        command.hooks = SimpleNamespace(forward=nothing)
+        with pytest.raises(RuntimeError, match=r"scaled.* must have an entry point, got none; "):
+            internals.Packed(command)
+
+
+# Native code ------------------------------------------------------------------------------------
+
+
+def test_arrays_in_native_code(precision):
+    real, vec3, c = {
+        "float32": (wp.float32, wp.vec3f, "float"), "float64": (wp.float64, wp.vec3d, "double"),
+    }[precision]  # fmt: skip
+
+    def pick(v: wp.array(dtype=vec3), table: wp.array2d(dtype=real), i: int) -> vec3: ...
+
+    snippet = f"""
+    const {c}* numbers = {internals.elements("v", c)};
+    const {c} corner = {internals.elements("table", c)}[{internals.columns("table")} + 1];
+    {internals.vector(3, c)} result;
+    result[0] = numbers[3 * i + 2]; result[1] = corner; result[2] = {internals.columns("table")};
+    return result + {internals.vector(3, c)}(0, 0, 1);
+"""
+    act = native(pick, snippet)
+
+    @kernel
+    def pick_rows(v: wp.array(dtype=vec3), table: wp.array2d(dtype=real), o: wp.array(dtype=vec3)):
+        i = wp.tid()
+        o[i] = act(v, table, i)
+
+    v = wp.array(np.arange(6.0).reshape(2, 3), dtype=vec3, device="cpu")
+    table = wp.array(np.arange(8.0).reshape(2, 4), dtype=real, device="cpu")
+    out = wp.zeros(2, dtype=vec3, device="cpu")
+    wp.launch(pick_rows, 2, [v, table, out], device="cpu")
+    assert out.numpy().tolist() == [[2.0, 5.0, 5.0], [5.0, 5.0, 5.0]]
+
+
+@pytest.mark.parametrize("shape", [(16, 16, 16), (5, 3, 2), (1, 1, 1)])  # most wrap around
+def test_runs_of_a_grid_are_its_query(shape):
+    def walk(grid: wp.uint64, u: wp.vec3d, row: int, seen: wp.array2d(dtype=int)) -> wp.int32: ...
+
+    visit = "for (int k = begin; k < end; ++k) found[n++] = k;"
+    snippet = f"""
+    int* found = {internals.elements("seen", "int")} + row * {internals.columns("seen")};
+    int n = 0;
+    {internals.grid_runs("grid", "u", "double", visit)}
+    return n;
+"""
+    act = native(walk, snippet, after_gradients=False)
+
+    @kernel
+    def both(
+        grid: wp.uint64, x: wp.array(dtype=wp.vec3d), runs: wp.array2d(dtype=int),
+        queried: wp.array2d(dtype=int), count: wp.array2d(dtype=int),
+    ):  # fmt: skip
+        i = wp.tid()
+        count[i, 0] = act(grid, x[i], i, runs)
+        for k in range(count[i, 0]):
+            runs[i, k] = wp.hash_grid_point_id(grid, runs[i, k])
+        n = int(0)
+        for j in wp.hash_grid_query(grid, x[i], wp.float64(1.0)):
+            queried[i, n] = j
+            n += 1
+        count[i, 1] = n
+
+    host = np.random.default_rng(0).uniform(-4.0, 9.0, (300, 3))
+    x = wp.array(host, dtype=wp.vec3d, device="cpu")
+    grid = wp.HashGrid(*shape, device="cpu", dtype=wp.float64)
+    grid.build(x, 1.0)
+    assert internals.grid_shape(grid) == shape
+    runs, queried = (wp.full((300, 300), -1, dtype=int, device="cpu") for _ in range(2))
+    count = wp.zeros((300, 2), dtype=int, device="cpu")
+    wp.launch(both, 300, [grid.id, x, runs, queried, count], device="cpu")
+    assert (count.numpy()[:, 0] == count.numpy()[:, 1]).all()
+    assert count.numpy().min() > 0
+    # Where cells wrap, the runs begin at another of the same cells.
+    np.testing.assert_array_equal(np.sort(runs.numpy()), np.sort(queried.numpy()))
