@@ -17,12 +17,13 @@ from .instruments.ledger.ledger import Ledger
 from .instruments.stability.check import StabilityWarning
 from .instruments.stability.report import Stability
 from .instruments.watchdog.incident import Incident, SimulationError, SimulationWarning
-from .interactions.fluid.equations_of_state import Polytrope, Tait
+from .interactions.fluid.equations_of_state import EquationOfState, Polytrope, Tait
 from .interactions.fluid.sph import SPH
-from .interactions.fluid.viscosities import ArtificialViscosity
+from .interactions.fluid.viscosities import ArtificialViscosity, Viscosity
 from .interactions.gravity import Gravity
 from .interactions.lennard_jones import LennardJones
 from .interactions.pair import PairForce, PairPotential
+from .interactions.pair_sum import PairSum
 from .interactions.particle import ConstantForce, Drag, ParticleForce, UniformGravity
 from .interactions.springs import Springs
 from .output.history.writer import History, read_history
@@ -49,6 +50,7 @@ __all__ = [
     "Contact",
     "Distance",
     "Drag",
+    "EquationOfState",
     "Gravity",
     "Group",
     "History",
@@ -60,6 +62,7 @@ __all__ = [
     "LennardJones",
     "PairForce",
     "PairPotential",
+    "PairSum",
     "ParticleForce",
     "PlaneBoundary",
     "Polytrope",
@@ -79,6 +82,7 @@ __all__ = [
     "Tuned",
     "UniformGravity",
     "UsdRecorder",
+    "Viscosity",
     "__version__",
     "law",
     "read_history",

@@ -1,11 +1,12 @@
 """Pair interactions: terms made of laws, and the kernels that sum them over the partners."""
 
 import functools
+from collections.abc import Mapping
 from typing import Any
 
 import warp as wp
 
-from ..engine.loops import Pairs, Periodicity, box_type, native_loop, plain_loop
+from ..engine.loops import Pairs, Periodicity, box_type, native_loop, plain_loop, reader
 from ..precision import Precision, function, function_from_source, register
 
 # A pair closer than p.closest is taken as that far apart, along a fixed direction: coincident
@@ -20,8 +21,8 @@ _SEPARATION = """
 
 
 def force_term(
-    law: wp.Function, arguments: list[str], derivative: bool, precision: Precision,
-    data: Any, params: Any,
+    law: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any,
+    derivative: bool,
 ) -> wp.Function:  # fmt: skip
     """Term f_ij = F(r) x_ij / r, with F the law itself or minus the derivative of an energy.
 
@@ -33,7 +34,7 @@ def force_term(
         evaluate = f"    {', '.join(names)} = wp.grad(law)({call})\n    f = -g0"
     else:
         evaluate = f"    f = law({call})"
-    return _term("pair_force", evaluate, "along * (f / r)", law, precision, data, params, "vec3")
+    return _term("pair_force", evaluate, "along * (f / r)", {"law": law}, precision, data, params)
 
 
 def measure_term(
@@ -45,25 +46,47 @@ def measure_term(
     evaluate = (
         f"    {', '.join(names)} = wp.grad(law)({call})\n    u = law({call})\n    half = real(0.5)"
     )
-    return _term(
-        "pair_measure", evaluate, "pair2(half * u, -half * r * g0)", energy, precision, data,
-        params, "pair2",
-    )  # fmt: skip
+    names_of = {"law": energy, "pair2": precision.vector(2)}
+    result = "pair2(half * u, -half * r * g0)"
+    return _term("pair_measure", evaluate, result, names_of, precision, data, params)
+
+
+def sum_term(
+    law: wp.Function, arguments: list[str], width: int, fields: Mapping[str, Any],
+    precision: Precision, data: Any, params: Any,
+) -> wp.Function:  # fmt: skip
+    """Term that is a law of the pair by itself, a number or a vector of ``width`` numbers.
+
+    ``arguments`` read what ``fields`` names, with its type, as ``read_<name>(d.<name>, j)``.
+    """
+    names = {"law": law, "one": precision.vector(1), **_readers(fields, precision)}
+    call = f"law({', '.join(arguments)})"
+    result = call if width > 1 else f"one({call})"
+    return _term("pair_sum", "", result, names, precision, data, params)
+
+
+def _readers(fields: Mapping[str, Any], precision: Precision) -> dict[str, wp.Function]:
+    """For arrays of these types the functions that read them fast."""
+    return {
+        f"read_{name}": reader(precision, None if kind is precision.scalar else len(kind()))
+        for name, kind in fields.items()
+    }
 
 
 def _term(
-    name: str, evaluate: str, result: str, law: wp.Function, precision: Precision, data: Any,
-    params: Any, returns: str,
+    name: str, evaluate: str, result: str, names: Mapping[str, Any], precision: Precision,
+    data: Any, params: Any,
 ) -> wp.Function:  # fmt: skip
     source = (
         f"def {name}(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: Params):"
         f"{_SEPARATION}{evaluate}\n    return {result}\n"
     )
     namespace = {
-        "wp": wp, "law": law, "real": precision.scalar, "vec3": precision.vec3,
-        "pair2": precision.vector(2), "Data": data, "Params": params,
+        "wp": wp, "real": precision.scalar, "vec3": precision.vec3, "Data": data,
+        "Params": params, **names,
     }  # fmt: skip
-    return function_from_source(source, namespace)
+    # Behind the adjoints that the law may call.
+    return function_from_source(source, namespace, after_gradients=True)
 
 
 def fused_term(
@@ -153,3 +176,31 @@ def store_measure(precision: Precision, data: Any, params: Any, out: Any) -> wp.
         o.virial[particle] = o.virial[particle] + wp.float64(total[1])
 
     return function(keep_measure)
+
+
+# Where the result of a sum goes: the row of the slot, or on top of what the particle's row holds.
+KEEP, ADD = "o.sum[i] = {}", "o.sum[particle] = o.sum[particle] + {}"
+
+
+def sum_store(
+    then: wp.Function | None, arguments: list[str], width: int, place: str, kind: Any,
+    fields: Mapping[str, Any], precision: Precision, data: Any, params: Any, out: Any,
+) -> wp.Function:  # fmt: skip
+    """Store: the sum, or what the law ``then`` makes of it, into its place in ``o.sum``.
+
+    ``kind`` is the type of that array's entries, ``fields`` are as for :func:`sum_term`.
+    """
+    value = "total[0]" if width == 1 else "total"
+    if then is not None:
+        value = f"then({', '.join(arguments)})"
+    if kind in (wp.float32, wp.float64):
+        value = f"kind({value})"
+    source = (
+        "def sum_store(i: int, particle: int, total: Total, d: Data, p: Params, o: Out):\n"
+        f"    {place.format(value)}\n"
+    )
+    namespace = {
+        "then": then, "kind": kind, "Total": precision.vector(width), "Data": data,
+        "Params": params, "Out": out, **_readers(fields, precision),
+    }  # fmt: skip
+    return function_from_source(source, namespace, after_gradients=True)

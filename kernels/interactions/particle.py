@@ -7,27 +7,32 @@ import warp as wp
 
 from ..precision import Precision, function_from_source, register
 
-_SOURCE = """def {name}(i: int, w: int, d: Data, p: Params):
-    return law({arguments})
-"""
-
 
 def _evaluation(
-    name: str, law: wp.Function, arguments: tuple[str, ...], precision: Precision, data: Any,
-    params: Any,
+    law: wp.Function, arguments: tuple[str, ...], precision: Precision, data: Any, params: Any,
+    derived: int | None = None,
 ) -> wp.Function:  # fmt: skip
-    namespace = {"law": law, "real": precision.scalar, "Data": data, "Params": params}
-    return function_from_source(
-        _SOURCE.format(name=name, arguments=", ".join(arguments)), namespace
-    )
+    """The law of particle i, or minus its derivative by one of its arguments."""
+    call = f"({', '.join(arguments)})"
+    lines = [f"return law{call}"]
+    if derived is not None:
+        gradients = ", ".join(f"g{k}" for k in range(len(arguments)))
+        lines = [f"{gradients} = wp.grad(law){call}", f"return -g{derived}"]
+    source = "\n    ".join(["def law_of(i: int, w: int, d: Data, p: Params):", *lines, ""])
+    namespace = {
+        "wp": wp, "law": law, "real": precision.scalar, "Data": data, "Params": params
+    }  # fmt: skip
+    # Behind the adjoints that it, or the law, may call.
+    return function_from_source(source, namespace, after_gradients=True)
 
 
 @functools.cache
 def force_kernel(
-    law: wp.Function, arguments: tuple[str, ...], precision: Precision, data: Any, params: Any
-) -> wp.Kernel:
-    """Kernel: f += law(...) on each member."""
-    evaluate = _evaluation("force_on", law, arguments, precision, data, params)
+    law: wp.Function, arguments: tuple[str, ...], derived: int | None, precision: Precision,
+    data: Any, params: Any,
+) -> wp.Kernel:  # fmt: skip
+    """Kernel: f += law(...) on each member, or minus its derivative by argument ``derived``."""
+    evaluate = _evaluation(law, arguments, precision, data, params, derived)
 
     @register
     def particle_force(
@@ -51,7 +56,7 @@ def energy_kernel(
     law: wp.Function, arguments: tuple[str, ...], precision: Precision, data: Any, params: Any
 ) -> wp.Kernel:
     """Kernel: energy += law(...) of each member."""
-    evaluate = _evaluation("energy_of", law, arguments, precision, data, params)
+    evaluate = _evaluation(law, arguments, precision, data, params)
 
     @register
     def particle_energy(

@@ -46,6 +46,7 @@ def density_term(weight: wp.Function, precision: Precision, data: Any, params: A
     return function(add_density)
 
 
+@functools.cache
 def keep_state(
     weight: wp.Function, pressure: wp.Function, sound_speed: wp.Function | None,
     precision: Precision, data: Any, params: Any, out: Any,
@@ -114,6 +115,7 @@ def virial_term(force: wp.Function, precision: Precision, data: Any, params: Any
     return function(add_virial)
 
 
+@functools.cache
 def add_force(precision: Precision, data: Any, params: Any, out: Any) -> wp.Function:
     """Store: f += m_i sum."""
     vec3 = precision.vec3
@@ -124,6 +126,7 @@ def add_force(precision: Precision, data: Any, params: Any, out: Any) -> wp.Func
     return function(add_to_force)
 
 
+@functools.cache
 def keep_measure(
     energy: wp.Function, precision: Precision, data: Any, params: Any, out: Any
 ) -> wp.Function:

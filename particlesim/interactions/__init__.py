@@ -1,1 +1,1 @@
-"""Interactions: what acts at the start of a substep."""
+"""Forces: what acts at the start of a substep, one file a kind, with what limits its step."""

@@ -44,7 +44,7 @@ class Arguments:
             suffix = next((s for s in suffixes if s and name.endswith(s)), "")
             base = name[: len(name) - len(suffix)]
             if name in given:
-                self.values[name] = self._value(name, given[name])
+                self.values[name] = self.value(name, given[name])
                 self.sources.append(("parameter", name))
             elif name in extra:
                 self.sources.append(("extra", name))
@@ -52,7 +52,7 @@ class Arguments:
                 self.quantities.add(base)
                 self.sources.append((f"quantity{suffix}", base))
             elif name in law.defaults:
-                self.values[name] = self._value(name, law.defaults[name])
+                self.values[name] = self.value(name, law.defaults[name])
                 self.sources.append(("parameter", name))
             else:
                 raise validate.fail(
@@ -75,8 +75,19 @@ class Arguments:
                     f"add_particles(..., {name}=...)."
                 )
 
-    def source(self, index: Mapping[str, str], extra: Mapping[str, str] | None = None) -> list[str]:
-        """Source text of each argument; ``index`` maps a suffix to the particle's index."""
+    def source(
+        self,
+        index: Mapping[str, str],
+        extra: Mapping[str, str] | None = None,
+        read: str = "d.{0}[{1}]",
+    ) -> list[str]:
+        """Source text of each argument.
+
+        Args:
+            index: The particle's index, by suffix.
+            extra: The text of what whoever calls fills in, by name.
+            read: How an array is read, of its name and an index.
+        """
         text = []
         for kind, name in self.sources:
             if kind == "parameter":
@@ -85,10 +96,11 @@ class Arguments:
                 text.append((extra or {})[name])
             else:
                 field = "x" if name == "position" else name
-                text.append(f"d.{field}[{index[kind.removeprefix('quantity')]}]")
+                text.append(read.format(field, index[kind.removeprefix("quantity")]))
         return text
 
-    def _value(self, name: str, value: Any) -> Any:
+    def value(self, name: str, value: Any) -> Any:
+        """A parameter's value, checked: whole, a number or a vector."""
         if self.law.parameters[name] is int:
             return np.int32(validate.whole(self.owner, name, value, minimum=-(2**31)))
         if np.ndim(value) == 0:

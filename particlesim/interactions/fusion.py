@@ -6,28 +6,28 @@ goes over its own worlds, so that the sums of every world run as they run when i
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import warp as wp
 
-from ..engine.execution.launch import launch
 from ..engine.neighbors.lists import Neighbors
 from ..engine.state import State
 from ..engine.structs import filled
 from ..kernels.interactions import pair as kernels
-from ..kernels.precision import Precision, structure
+from ..kernels.precision import structure
 from ..scene.part import Interaction
 from .pair import Pair
+from .pair_loop import PairLoop
 
 
-class FusedPairs(Interaction):
-    """Several pair forces over one list, summed in one loop.
+class PairPass(Interaction):
+    """Pair forces over one list, summed in one loop, in some worlds or in all.
 
-    The row of neighbours and their positions are read once, which takes 0.8 to 0.9 of the time of
-    two passes over a Lennard-Jones liquid. Each keeps its cutoff and reports its own energy.
+    Of several the row of neighbours and their positions are read once, which takes 0.8 to 0.9 of
+    the time of two passes over a Lennard-Jones liquid. Each keeps its cutoff and reports its own
+    energy.
 
     Args:
         parts: Bound and attached pair interactions with the same list in the worlds of the pass.
@@ -35,78 +35,43 @@ class FusedPairs(Interaction):
     """
 
     def __init__(self, parts: Sequence[Pair], active: np.ndarray):
+        self.parts = parts
         first = parts[0]
-        self.parts, self.model, self.pairs, self.out = parts, first.model, first.pairs, first.out
-        precision = self.model.precision
-        kinds = {f"part_{k}": part for k, part in enumerate(parts)}
-        Data, Params = _types(
-            precision, tuple(part.Data for part in parts), tuple(part.Params for part in parts)
-        )
-        self.data = Data()
-        self.data.x = self.pairs.fields["position"]
-        for name, part in kinds.items():
-            setattr(self.data, name, filled(part.Data, part.fields_of(self.pairs)))
-        columns = {name: part.params.numpy() for name, part in kinds.items()}
-        cutoffs = [column["cutoff_squared"] for column in columns.values()]
-        reach = np.where(active, np.max(cutoffs, axis=0), 0.0)
-        self.params = self.model.structures(Params, {"cutoff_squared": reach, **columns})
-        term = kernels.fused_term([part.term for part in parts], precision, Data, Params)
-        self.kernel = kernels.pair_kernel(
-            term, kernels.add_force(precision, Data, Params, first.Out), Data, Params, first.Out, 3,
-            precision, self.model.periodic, self.pairs.partners, self.model.vectorised,
-        )  # fmt: skip
+        self.loop, self.term = _fused(parts) if len(parts) > 1 else (first.loop, first.term)
+        host = self.loop.params.numpy()
+        columns = {name: host[name] for name in host.dtype.names}
+        columns["cutoff_squared"] = np.where(active, columns["cutoff_squared"], 0.0)
+        params = first.model.structures(self.loop.Params, columns)
+        self.loop = replace(self.loop, params=params)
 
     @property
     def name(self) -> str:
         return " + ".join(part.name for part in self.parts)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        inputs = [self.pairs.pairs, self.model.box, self.params, self.data, self.out]
-        launch(self.kernel, self.pairs.count, inputs, self.model.device)
+        self.loop.sum(self.term, kernels.add_force, {"f": state.force}, 3)
 
 
-@functools.cache
-def _types(precision: Precision, data: tuple[Any, ...], params: tuple[Any, ...]) -> tuple[Any, Any]:
-    """Structs of the parts' structs, the same ones for the same parts, so kernels are reused."""
-    return (
-        structure(
-            "FusedData",
-            {
-                "x": wp.array(dtype=precision.vec3),
-                **{f"part_{k}": each for k, each in enumerate(data)},
-            },
-        ),
-        structure(
-            "FusedParameters",
-            {
-                "cutoff_squared": precision.scalar,
-                **{f"part_{k}": each for k, each in enumerate(params)},
-            },
-        ),
+def _fused(parts: Sequence[Pair]) -> tuple[PairLoop, wp.Function]:
+    """The loop and the term of several pair forces together."""
+    model, pairs = parts[0].model, parts[0].pairs
+    precision, names = model.precision, {f"part_{k}": part for k, part in enumerate(parts)}
+    loops = {name: part.loop for name, part in names.items()}
+    Data = structure("FusedData", {"x": wp.array(dtype=precision.vec3)}
+                     | {name: loop.Data for name, loop in loops.items()})  # fmt: skip
+    Params = structure("FusedParameters", {"cutoff_squared": precision.scalar}
+                       | {name: loop.Params for name, loop in loops.items()})  # fmt: skip
+    data, columns = Data(), {}
+    data.x = pairs.fields["position"]
+    for name, part in names.items():
+        setattr(data, name, filled(part.loop.Data, part.fields_of(pairs)))
+        columns[name] = part.params.numpy()
+    columns["cutoff_squared"] = np.max(
+        [each["cutoff_squared"] for each in columns.values()], axis=0
     )
-
-
-class InSomeWorlds(Interaction):
-    """A pair force in those worlds where it has a pass of its own.
-
-    Args:
-        part: A bound and attached pair interaction.
-        active: By world, whether it takes part.
-    """
-
-    def __init__(self, part: Pair, active: np.ndarray):
-        self.part = part
-        host = part.params.numpy()
-        columns = {name: host[name] for name in host.dtype.names}
-        columns["cutoff_squared"] = np.where(active, columns["cutoff_squared"], 0.0)
-        self.params = part.model.structures(part.Params, columns)
-
-    @property
-    def name(self) -> str:
-        return self.part.name
-
-    def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        self.part.add_forces(self.params)
+    params = model.structures(Params, columns)
+    term = kernels.fused_term([part.term for part in parts], precision, Data, Params)
+    return PairLoop(model, pairs, Data, data, Params, params), term
 
 
 def fuse(interactions: Sequence[Interaction]) -> list[Interaction]:
@@ -125,8 +90,8 @@ def _passes(parts: Sequence[Pair]) -> dict[int, list[Interaction]]:
     leader = np.array([part.pairs.leader for part in parts])
     # Where a part looks for nothing it goes with whom it goes elsewhere, if that is anywhere.
     elsewhere = leader.max(axis=1, keepdims=True)
-    alone = -1 - np.arange(len(parts))[:, None]
-    leader = np.where(leader < 0, np.where(elsewhere < 0, alone, elsewhere), leader)
+    own = -1 - np.arange(len(parts))[:, None]
+    leader = np.where(leader < 0, np.where(elsewhere < 0, own, elsewhere), leader)
     patterns, pattern_of = np.unique(leader, axis=1, return_inverse=True)
     active: dict[tuple[int, ...], np.ndarray] = {}
     for number, pattern in enumerate(patterns.T):
@@ -136,12 +101,7 @@ def _passes(parts: Sequence[Pair]) -> dict[int, list[Interaction]]:
     result: dict[int, list[Interaction]] = {}
     for group, worlds in active.items():
         together = [parts[k] for k in group]
-        result.setdefault(id(together[0]), []).append(_pass(together, worlds))
+        alone = len(together) == 1 and worlds.all()
+        found = together[0] if alone else PairPass(together, worlds)
+        result.setdefault(id(together[0]), []).append(found)
     return result
-
-
-def _pass(parts: Sequence[Pair], active: np.ndarray) -> Interaction:
-    """One pass over these, in the worlds where they have one list."""
-    if len(parts) > 1:
-        return FusedPairs(parts, active)
-    return parts[0] if active.all() else InSomeWorlds(parts[0], active)

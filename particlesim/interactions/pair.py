@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import warp as wp
 
 from .. import validate
-from ..engine.execution.launch import launch
 from ..engine.model import Model
 from ..engine.neighbors.all_pairs import AllPairs
 from ..engine.neighbors.lists import Neighbors
 from ..engine.probing.limit import Limit
 from ..engine.probing.probe import Probe
 from ..engine.state import State
-from ..engine.structs import filled, structure_of
 from ..kernels.interactions import pair as kernels
 from ..scene.law import Law
 from ..scene.law import law as make_law
 from ..scene.part import Interaction
 from .arguments import Arguments
 from .pair_limits import collisions
-
-# Closer than this, particles count as coincident: in parts of the cutoff, and without a cutoff.
-COINCIDENT, CLOSEST = 1e-6, 1e-12
-OWN = {"cutoff_squared", "closest_squared"}  # parameters of every pair force
+from .pair_loop import PairLoop, check_names, squared_distances
 
 
 class Pair(Interaction):
@@ -65,12 +61,7 @@ class Pair(Interaction):
                     self.name, "law", "take the distance r as its first parameter", each.name,
                     "write def law(r, ...)",
                 )  # fmt: skip
-            taken = sorted(OWN & each.parameters.keys())
-            if taken:
-                raise validate.fail(
-                    self.name, f"parameter of {each.name}", "have a name of its own", taken[0],
-                    "rename it",
-                )  # fmt: skip
+            check_names(self.name, each)
             if "cutoff" in each.parameters and self.cutoff is not None:
                 parameters = {**parameters, "cutoff": self.cutoff}
         if potential is not None:
@@ -101,76 +92,41 @@ class Pair(Interaction):
         self.model = model
         for each in self.arguments:
             each.check(model.attributes)
-        members = model.members([peer.group for peer in self.peers], self.name)
-        cutoff = (
-            None if self.cutoff is None else np.array([peer.cutoff for peer in self.peers], float)
-        )
-        self.pairs = neighbors.request(self.name, members, cutoff, self.quantities | {"position"})
+        self.pairs = neighbors.of(self, self.quantities)
         columns = self.columns(self.parameters)
-        columns["cutoff_squared"] = (
-            np.full(model.world_count, np.finfo(model.precision.numpy).max)
-            if cutoff is None
-            else cutoff**2 * [peer.acts for peer in self.peers]
-        )
-        columns["closest_squared"] = (
-            np.full(model.world_count, CLOSEST**2) if cutoff is None else (COINCIDENT * cutoff) ** 2
-        )
+        cutoff = None if self.cutoff is None else np.array([peer.cutoff for peer in self.peers])
+        columns |= squared_distances(model, cutoff)
+        columns["cutoff_squared"] *= [peer.acts for peer in self.peers]
         self.Params, self.params = model.parameters("PairParameters", columns)
 
     def attach(self, model: Model, state: State) -> None:
         fields = self.fields_of(self.pairs)
-        self.Data = structure_of("PairData", fields)
-        self.data = filled(self.Data, fields)
-        out = {"f": state.force}
-        self.Out = structure_of("PairForces", out)
-        self.out = filled(self.Out, out)
-        precision = model.precision
-        derivative = self.force is None
-        chosen = self.laws[-1]
-        arguments = self.arguments[-1].source({"_i": "i", "_j": "j"})
-        self.term = kernels.force_term(
-            chosen.function(precision), arguments, derivative, precision, self.Data, self.Params
-        )
-        store = kernels.add_force(precision, self.Data, self.Params, self.Out)
-        self.kernel = self._kernel(self.term, store, self.Out, 3, vectorised=model.vectorised)
+        self.loop = PairLoop.over(model, self.pairs, "Pair", fields, self.Params, self.params)
+        self.term = self._term(kernels.force_term, -1, derivative=self.force is None)
 
     def fields_of(self, pairs: AllPairs) -> dict[str, wp.array]:
         """What the term reads, in the order of a list's slots."""
         own = {name: pairs.fields[name] for name in self.quantities if name != "position"}
         return {"x": pairs.fields["position"], **own}
 
-    def _kernel(self, term: Any, store: Any, out: Any, width: int, vectorised: bool) -> Any:
-        model = self.model
-        return kernels.pair_kernel(
-            term, store, self.Data, self.Params, out, width, model.precision, model.periodic,
-            self.pairs.partners, vectorised,
-        )  # fmt: skip
+    def _term(self, make: Callable[..., wp.Function], k: int, **options: bool) -> wp.Function:
+        """A term of the k-th law."""
+        precision = self.model.precision
+        arguments = self.arguments[k].source({"_i": "i", "_j": "j"})
+        law = self.laws[k].function(precision)
+        return make(law, arguments, precision, self.loop.Data, self.Params, **options)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        self.add_forces(self.params)
-
-    def add_forces(self, params: wp.array) -> None:
-        """Sum the forces by these parameters, one entry a world."""
-        inputs = [self.pairs.pairs, self.model.box, params, self.data, self.out]
-        launch(self.kernel, self.pairs.count, inputs, self.model.device)
+        self.loop.sum(self.term, kernels.add_force, {"f": state.force}, 3)
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the gradient at the present distances and, within a cutoff, at those to come."""
         return probe.response(self) + ([] if self.cutoff is None else collisions(self, probe))
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
-        if self.potential is None:
-            return
-        precision, out = self.model.precision, {"energy": energy, "virial": virial}
-        Out = structure_of("PairMeasures", out)
-        arguments = self.arguments[0].source({"_i": "i", "_j": "j"})
-        term = kernels.measure_term(
-            self.potential.function(precision), arguments, precision, self.Data, self.Params
-        )
-        store = kernels.store_measure(precision, self.Data, self.Params, Out)
-        kernel = self._kernel(term, store, Out, 2, vectorised=self.model.vectorised)
-        inputs = [self.pairs.pairs, self.model.box, self.params, self.data, filled(Out, out)]
-        launch(kernel, self.pairs.count, inputs, self.model.device)
+        if self.potential is not None:
+            term = self._term(kernels.measure_term, 0)
+            self.loop.sum(term, kernels.store_measure, {"energy": energy, "virial": virial}, 2)
 
 
 class PairPotential(Pair):

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import warp as wp
 
-from ..engine.execution.launch import launch
 from ..engine.probing.limit import Limit, explicit_step
 from ..engine.probing.probe import Probe
 from ..engine.structs import filled
 from ..kernels.engine.loops import Pairs
+from ..kernels.interactions.pair import add_force
 
 POINTS = 1024  # distances at which a law is asked, from the cutoff inwards
 NEAREST = 1e-3  # of the cutoff
@@ -143,8 +145,8 @@ def forces(part: Any, probe: Probe, w: int, couples: np.ndarray, r: np.ndarray) 
         source = probe.state[name]
         fields[name] = model.array(source.numpy()[particle], source.dtype)
     f = wp.zeros(2 * count, dtype=precision.vec3, device=model.device)
-    inputs = [pairs, model.box, part.params, filled(part.Data, fields),
-              filled(part.Out, {"f": f})]  # fmt: skip
-    launch(part.kernel, 2 * count, inputs, model.device)
+    listed = SimpleNamespace(pairs=pairs, count=2 * count, partners=part.pairs.partners)
+    loop = replace(part.loop, pairs=listed, data=filled(part.loop.Data, fields))
+    loop.sum(part.term, add_force, {"f": f}, 3)
     values = f.numpy()[1::2, 0].astype(np.float64).reshape(len(couples), len(r))
     return np.clip(np.nan_to_num(values), -LARGEST, LARGEST)

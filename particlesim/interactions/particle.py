@@ -22,34 +22,48 @@ from .arguments import Arguments
 
 
 class ParticleForce(Interaction):
-    """Force on each particle by a law of its own state.
+    """Force on each particle by a law of its own state: of a field f(x, t), or of a potential.
+
+    A potential is enough: without a law of the force it is f = -dU/dx, derived by ``wp.grad``
+    inside the kernel.
 
     Args:
-        law: Returns the force, ``wp.vec3``. Its parameters are, by name, the particle's
-            ``position``, ``velocity``, ``mass``, ``radius`` or an attribute given to
-            ``add_particles``; ``time`` [time]; or values given here.
+        law: Returns the force, ``wp.vec3``; None: it is derived from ``potential``. Its parameters
+            are, by name, the particle's ``position``, ``velocity``, ``mass``, ``radius`` or an
+            attribute given to ``add_particles``; ``time`` [time]; or values given here.
         group: Which particles feel it; None: all.
         potential: Law of the potential energy, a float, of the same parameters; None: none is
             reported.
         **parameters: Numbers or 3-vectors for the laws' other parameters.
 
+    Raises:
+        ValueError: Neither law is given, or the force is to be derived of a potential that does
+            not take ``position`` or that Warp cannot derive.
+
     Example:
         >>> import warp as wp
         >>> @law
         ... def trap(position: wp.vec3, stiffness: float):
-        ...     return -stiffness * position
-        >>> ParticleForce(trap, stiffness=2.0).parameters
+        ...     return 0.5 * stiffness * wp.dot(position, position)
+        >>> ParticleForce(potential=trap, stiffness=2.0).parameters
         {'stiffness': 2.0}
+        >>> @law
+        ... def wave(position: wp.vec3, time: float, height: float):
+        ...     return wp.vec3(0.0, height * wp.sin(position[0] - time), 0.0)
+        >>> ParticleForce(wave, height=0.1).potential is None
+        True
     """
 
     def __init__(
-        self, law: Any, group: Any = None, *, potential: Any = None, **parameters: Any
+        self, law: Any = None, group: Any = None, *, potential: Any = None, **parameters: Any
     ) -> None:
-        self.law, self.group = make_law(law), group
-        self.potential = None if potential is None else make_law(potential)
-        laws = [self.law] if self.potential is None else [self.law, self.potential]
+        self.law, self.potential = (each and make_law(each) for each in (law, potential))
+        self.group = group
+        laws = [each for each in (self.law, self.potential) if each is not None]
+        if self.law is None:
+            self._check_derived()
         taken = {name for each in laws for name in each.parameters}
-        validate.known(self.name, parameters, taken, f"parameter of {self.law.name}")
+        validate.known(self.name, parameters, taken, f"parameter of {laws[0].name}")
         self.arguments = [self._arguments(each, parameters) for each in laws]
         self.parameters: dict[str, Any] = {}
         self.quantities: set[str] = set()
@@ -60,13 +74,25 @@ class ParticleForce(Interaction):
             timed |= ("extra", "time") in each.sources
         self.requires = frozenset({"force"} | self.quantities | ({"time"} if timed else set()))
 
+    def _check_derived(self) -> None:
+        if self.potential is None:
+            raise validate.fail(
+                self.name, "law", "be given, or a potential", None, "pass a law of the force"
+            )
+        if "position" not in self.potential.parameters:
+            raise validate.fail(
+                self.name, f"potential {self.potential.name}", "take position, to be derived by it",
+                ", ".join(self.potential.parameters), "or give the law of the force itself",
+            )  # fmt: skip
+        self.potential.check_derivable(self.name)
+
     def _arguments(self, each: Law, given: dict[str, Any]) -> Arguments:
         own = {name: value for name, value in given.items() if name in each.parameters}
         return Arguments(self.name, each, 0, own, ("",), extra=("time",))
 
     def kind(self) -> tuple[Any, ...]:
-        return (type(self), self.law.key, self.potential and self.potential.key,
-                tuple(self.parameters))  # fmt: skip
+        laws = [each and each.key for each in (self.law, self.potential)]
+        return (type(self), *laws, tuple(self.parameters))
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
@@ -87,33 +113,30 @@ class ParticleForce(Interaction):
             fields["time"] = state.time
         self.Data = structure_of("ParticleData", fields)
         self.data = filled(self.Data, fields)
-        self.kernel = kernels.force_kernel(
-            self.law.function(model.precision), tuple(self._source(self.arguments[0])),
-            model.precision, self.Data, self.Params,
-        )  # fmt: skip
+        own = self.arguments[0]
+        derived = own.names.index("position") if self.law is None else None
+        self.kernel = kernels.force_kernel(*self._called(own), derived, *self._types)
 
-    def _source(self, arguments: Arguments) -> list[str]:
-        return arguments.source({"": "i"}, {"time": "real(d.time[w])"})
+    @property
+    def _types(self) -> tuple[Any, Any, Any]:
+        return self.model.precision, self.Data, self.Params
+
+    def _called(self, arguments: Arguments) -> tuple[wp.Function, tuple[str, ...]]:
+        """A law's function, and the source of its arguments."""
+        source = arguments.source({"": "i"}, {"time": "real(d.time[w])"})
+        return arguments.law.function(self.model.precision), tuple(source)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        inputs = [self.members, self.world, self.params, self.data, state.force]
-        launch(self.kernel, self.count, inputs, self.model.device)
+        self._launch(self.kernel, state.force)
 
-    def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
-        if self.potential is None:
-            return
-        kernel = kernels.energy_kernel(
-            self.potential.function(self.model.precision),
-            tuple(self._source(self.arguments[1])),
-            self.model.precision, self.Data, self.Params,
-        )  # fmt: skip
-        inputs = [self.members, self.world, self.params, self.data, energy]
+    def _launch(self, kernel: wp.Kernel, array: wp.array) -> None:
+        inputs = [self.members, self.world, self.params, self.data, array]
         launch(kernel, self.count, inputs, self.model.device)
 
-
-@law
-def _weight(mass: float, acceleration: wp.vec3):
-    return mass * acceleration
+    def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
+        if self.potential is not None:
+            called = self._called(self.arguments[-1])
+            self._launch(kernels.energy_kernel(*called, *self._types), energy)
 
 
 @law
@@ -135,12 +158,7 @@ class UniformGravity(ParticleForce):
 
     def __init__(self, acceleration: Sequence[float] = (0.0, -9.81, 0.0), group: Any = None):
         g = validate.vector(self.name, "acceleration", acceleration, unit="length/time^2")
-        super().__init__(_weight, group, potential=_height_energy, acceleration=g)
-
-
-@law
-def _constant(force: wp.vec3):
-    return force
+        super().__init__(None, group, potential=_height_energy, acceleration=g)
 
 
 @law
@@ -158,7 +176,7 @@ class ConstantForce(ParticleForce):
 
     def __init__(self, force: Sequence[float], group: Any = None):
         value = validate.vector(self.name, "force", force, unit="force")
-        super().__init__(_constant, group, potential=_constant_energy, force=value)
+        super().__init__(None, group, potential=_constant_energy, force=value)
 
 
 @law

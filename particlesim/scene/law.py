@@ -35,6 +35,7 @@ class Law:
         signature = inspect.signature(func, eval_str=True)
         self.parameters: dict[str, Any] = {}
         self.defaults: dict[str, Any] = {}
+        self.returns = signature.return_annotation
         for name, parameter in signature.parameters.items():
             if parameter.kind not in (parameter.POSITIONAL_OR_KEYWORD, parameter.POSITIONAL_ONLY):
                 raise TypeError(

@@ -6,10 +6,12 @@ alone, made and renewed at the same moments: its sums then run in the same order
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...scene.part import Interaction
 from ..model import Model
 from ..state import State
 from .all_pairs import AllPairs
@@ -49,6 +51,22 @@ class Neighbors:
         self.model = model
         self.lists: list[AllPairs] = []
         self.requests: list[Request] = []
+        self._of: dict[int, AllPairs] = {}
+
+    def of(self, part: Interaction, names: Iterable[str] = ()) -> AllPairs:
+        """The list of an interaction: of its ``group``, within its ``cutoff`` in each world.
+
+        Requested when it is first asked for, which must be in ``prepare``, as must whatever names
+        more arrays to have in slot order.
+        """
+        if id(part) not in self._of:
+            members = self.model.members([peer.group for peer in part.peers], part.name)
+            cutoffs = [peer.cutoff for peer in part.peers]
+            cutoff = None if part.cutoff is None else np.array(cutoffs, float)
+            self._of[id(part)] = self.request(part.name, members, cutoff, {"position", *names})
+        found = self._of[id(part)]
+        found.request(set(names))
+        return found
 
     def request(
         self,

@@ -10,14 +10,36 @@ from .fluid_part import FluidPart
 
 
 class EquationOfState(FluidPart):
-    """Base of barotropic equations of state P(rho).
+    """Base of barotropic equations of state P(rho), for those of one's own too.
 
-    A member gives three laws. Each may name ``density``, ``rest_density`` and ``smoothing_length``
-    of the ``SPH``, and the member's own ``parameters``:
+    A member sets ``parameters``, a dict of numbers that may differ from world to world, and gives
+    three laws, which return numbers and choose by ``wp.where``, ``wp.min`` or ``wp.max``:
 
     - ``pressure``: P [mass / (length time^2)];
-    - ``energy``: u = int P / rho^2 drho per mass [length^2/time^2], the potential of the pressure;
-    - ``sound_speed``: c = sqrt(dP/drho) [length/time]; it may name ``pressure`` too.
+    - ``energy``: u = int P / rho^2 drho per mass [length^2/time^2], the potential of the pressure:
+      what diagnostics report, and what P must derive from for energy to be conserved;
+    - ``sound_speed``: c = sqrt(dP/drho) [length/time], which bounds the step.
+
+    Each may name ``density``, ``rest_density`` and ``smoothing_length`` of the ``SPH``, and the
+    ``parameters``; ``sound_speed`` may name ``pressure`` too.
+
+    Example:
+        >>> @law
+        ... def pressure(density: float, speed: float):
+        ...     return speed * speed * density
+        >>> @law
+        ... def energy(density: float, rest_density: float, speed: float):
+        ...     return speed * speed * wp.log(density / rest_density)
+        >>> @law
+        ... def sound_speed(speed: float):
+        ...     return speed
+        >>> class Isothermal(EquationOfState):
+        ...     pressure, energy, sound_speed = pressure, energy, sound_speed
+        ...     def __init__(self, speed):
+        ...         self.parameters = {"speed": speed}
+        >>> gas = SPH(smoothing_length=0.1, rest_density=1.0, equation_of_state=Isothermal(300.0))
+        >>> sorted(gas.parameters)
+        ['rest_density', 'smoothing_length', 'state_speed']
     """
 
     pressure: Law

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
-from ...scene.law import Law
+from ...scene.law import Law, law
 
 
 class FluidPart:
     """Base of what an ``SPH`` is made of: a member gives its laws, and the values they are fed."""
 
     law_names: tuple[str, ...]
-    parameters: dict[str, Any]
+    parameters: Mapping[str, Any] = MappingProxyType({})
 
     @property
     def name(self) -> str:
@@ -20,5 +22,13 @@ class FluidPart:
 
     @property
     def laws(self) -> dict[str, Law]:
-        """The laws by name."""
-        return {name: getattr(self, name) for name in self.law_names}
+        """The laws by name.
+
+        Raises:
+            TypeError: One is missing, or no function.
+        """
+        for name in self.law_names:
+            if not hasattr(self, name):
+                wanted = ", ".join(self.law_names)
+                raise TypeError(f"{self.name}: laws must be {wanted}, got no {name}; give it one.")
+        return {name: law(getattr(self, name)) for name in self.law_names}

@@ -70,7 +70,7 @@ def _sums(sph: SPH, world: int, slots: slice, where: np.ndarray, samples: np.nda
     """The sums of (V A, V) W at the points, by a grid over the particles as they are now."""
     model, device = sph.model, sph.model.device
     precision = model.precision
-    x = sph.data.x[slots]
+    x = sph.pairs.fields["position"][slots]
     host = x.numpy().astype(np.float64)
     grid, cells = sph.pairs.grid_over(world, host)
     cells.first = 0  # of the slots at hand

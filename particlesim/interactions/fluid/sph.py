@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ... import validate
-from ...engine.execution.launch import launch
 from ...engine.model import Model
 from ...engine.neighbors.lists import Neighbors
 from ...engine.neighbors.verlet import VerletList
 from ...engine.probing.limit import Limit
 from ...engine.probing.probe import Probe
 from ...engine.state import State
-from ...engine.structs import filled, structure_of
 from ...kernels.interactions import sph as kernels
-from ...kernels.interactions.pair import pair_kernel
 from ...scene.part import Interaction
+from ..pair_loop import PairLoop, squared_distances
 from .equations_of_state import EquationOfState
 from .limits import fluid_limits
 from .smoothing import SMOOTHING, SUPPORT
@@ -145,17 +144,15 @@ class SPH(Interaction):
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
-        members = model.members([peer.group for peer in self.peers], self.name)
         columns = self.columns(self.parameters)
         h = columns["smoothing_length"]
-        names = {"position", "mass"} | ({"velocity"} if self.viscosity else set())
-        pairs = neighbors.request(self.name, members, SUPPORT * h, names)
+        pairs = neighbors.of(self, {"mass"} | ({"velocity"} if self.viscosity else set()))
         assert isinstance(pairs, VerletList)  # as there is a cutoff
         self.pairs = pairs
         columns["inverse_h"] = 1.0 / h
         with np.errstate(divide="ignore", over="ignore", under="ignore"):
             columns["sigma"] = self.smoothing.sigma / h**self.dimension
-        columns["cutoff_squared"] = (SUPPORT * h) ** 2
+        columns |= squared_distances(model, SUPPORT * h)
         columns["closest_squared"] = (COINCIDENT * h) ** 2
         self._check_range(columns)
         self.Params, self.params = model.parameters("FluidParameters", columns)
@@ -180,67 +177,38 @@ class SPH(Interaction):
         fields = {"x": own["position"], "m": own["mass"], "state": self.slot_state}
         if self.viscosity is not None:
             fields["v"] = own["velocity"]
-        self.Data = structure_of("FluidData", fields)
-        self.data = filled(self.Data, fields)
+        self.loop = PairLoop.over(model, self.pairs, "Fluid", fields, self.Params, self.params)
         self.state = state
-        self._attach_density(state)
-        self._attach_force(state)
-
-    def _attach_density(self, state: State) -> None:
-        precision = self.model.precision
-        out = {"state": self.slot_state, "rho": state.density, "pressure": state.pressure}
-        self.DensityOut, self.density_out = self._out("FluidStates", out)
+        self.laws = self._laws()
         self.weight = self.smoothing.weight.function(precision)
-        sounds = self.viscosity is not None
-        sound_speed = self._law(self.equation_of_state, "sound_speed") if sounds else None
-        self.density_kernel = self._density_kernel(sound_speed)
+        types = precision, self.loop.Data, self.Params
+        self.density_term = kernels.density_term(self.weight, *types)
+        slope = self.smoothing.slope.function(precision)
+        self.force_term = kernels.force_term(slope, self.laws.get("term"), self.dimension, *types)
 
-    def _density_kernel(self, sound_speed: wp.Function | None) -> wp.Kernel:
+    def _laws(self) -> dict[str, wp.Function]:
+        """The parts' laws as functions of their variables and the fluid's parameters."""
         precision = self.model.precision
-        term = kernels.density_term(self.weight, precision, self.Data, self.Params)
-        store = kernels.keep_state(
-            self.weight, self._law(self.equation_of_state, "pressure"), sound_speed, precision,
-            self.Data, self.Params, self.DensityOut,
-        )  # fmt: skip
-        return self._kernel(term, store, self.DensityOut, 1)
-
-    def _attach_force(self, state: State) -> None:
-        precision = self.model.precision
-        Out, self.force_out = self._out("FluidForces", {"f": state.force})
-        viscosity = self._law(self.viscosity, "term") if self.viscosity else None
-        self.force_term = kernels.force_term(
-            self.smoothing.slope.function(precision), viscosity, self.dimension, precision,
-            self.Data, self.Params,
-        )  # fmt: skip
-        store = kernels.add_force(precision, self.Data, self.Params, Out)
-        self.force_kernel = self._kernel(self.force_term, store, Out, 3)
-
-    def _law(self, part: EquationOfState | Viscosity, name: str) -> Any:
-        """A law of a part as a function of its variables and the fluid's parameters."""
-        precision = self.model.precision
-        return kernels.bound_law(
-            name, part.laws[name].function(precision), VARIABLES[name], self.sources[name],
-            precision, self.Params,
-        )  # fmt: skip
-
-    def _out(self, name: str, fields: dict[str, wp.array]) -> tuple[Any, Any]:
-        kind = structure_of(name, fields)
-        return kind, filled(kind, fields)
-
-    def _kernel(self, term: Any, store: Any, out: Any, width: int) -> Any:
-        model = self.model
-        return pair_kernel(
-            term, store, self.Data, self.Params, out, width, model.precision, model.periodic,
-            self.pairs.partners, vectorised=model.vectorised,
-        )  # fmt: skip
-
-    def _launch(self, kernel: Any, out: Any) -> None:
-        inputs = [self.pairs.pairs, self.model.box, self.params, self.data, out]
-        launch(kernel, self.pairs.count, inputs, self.model.device)
+        laws = self.equation_of_state.laws | (self.viscosity.laws if self.viscosity else {})
+        return {
+            name: kernels.bound_law(
+                name, law.function(precision), VARIABLES[name], self.sources[name], precision,
+                self.Params,
+            )
+            for name, law in laws.items()
+        }  # fmt: skip
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        self._launch(self.density_kernel, self.density_out)
-        self._launch(self.force_kernel, self.force_out)
+        self._sum_density(state)
+        self.loop.sum(self.force_term, kernels.add_force, {"f": state.force}, 3)
+
+    def _sum_density(self, state: State, sounds: bool = False) -> None:
+        """Density, pressure and their slots; speeds of sound for a viscosity, or if asked for."""
+        sounds = sounds or self.viscosity is not None
+        laws = self.laws["pressure"], self.laws["sound_speed"] if sounds else None
+        store = functools.partial(kernels.keep_state, self.weight, *laws)
+        out = {"state": self.slot_state, "rho": state.density, "pressure": state.pressure}
+        self.loop.sum(self.density_term, store, out, 1)
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By sound with viscosity, and by acceleration."""
@@ -250,8 +218,7 @@ class SPH(Interaction):
         """Speed of sound at the present densities, of each member [length/time]."""
         probe.force([self])
         if self.viscosity is None:  # whose passes have no need of it
-            kernel = self._density_kernel(self._law(self.equation_of_state, "sound_speed"))
-            self._launch(kernel, self.density_out)
+            self._sum_density(probe.state, sounds=True)
         c = np.empty(self.pairs.count)
         members = self.pairs.members_host
         c[np.searchsorted(members, self.pairs.order.numpy())] = self.slot_state.numpy()[:, 3]
@@ -261,18 +228,15 @@ class SPH(Interaction):
         """Density, pressure and their slots at the present positions; not within a substep."""
         self.pairs.update(self.state)
         self.pairs.grow()
-        self._launch(self.density_kernel, self.density_out)
+        self._sum_density(self.state)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         """Add the energy m u(rho) at the present positions, and the virial of all pair forces."""
-        self._launch(self.density_kernel, self.density_out)
-        precision = self.model.precision
-        Out, out = self._out("FluidMeasures", {"energy": energy, "virial": virial})
-        term = kernels.virial_term(self.force_term, precision, self.Data, self.Params)
-        store = kernels.keep_measure(
-            self._law(self.equation_of_state, "energy"), precision, self.Data, self.Params, Out
-        )
-        self._launch(self._kernel(term, store, Out, 1), out)
+        self._sum_density(state)
+        precision, energy_law = self.model.precision, self.laws["energy"]
+        term = kernels.virial_term(self.force_term, precision, self.loop.Data, self.Params)
+        store = functools.partial(kernels.keep_measure, energy_law)
+        self.loop.sum(term, store, {"energy": energy, "virial": virial}, 1)
 
     def interpolate(self, points: Any, field: Any, **options: Any) -> np.ndarray:
         """Of a simulation: ``sim.interpolate(fluid, points, field)``."""

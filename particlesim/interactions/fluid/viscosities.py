@@ -10,17 +10,31 @@ from .fluid_part import FluidPart
 
 
 class Viscosity(FluidPart):
-    """Base of viscosities that act along the pair, as a term Pi_ij beside P/rho^2.
+    """Base of viscosities that act along the pair, as a term Pi_ij beside P/rho^2; also one's own.
 
-    A member gives one law, ``term``: Pi_ij [length^5 / (mass time^2)] of what it names of
+    A member sets ``parameters``, a dict of numbers that may differ from world to world, and gives
+    one law, ``term``: Pi_ij [length^5 / (mass time^2)], the same for i and j, of what it names of
 
     - ``approach``: v_ij . x_ij, negative where the pair approaches [length^2/time];
     - ``distance_squared``: r^2 [length^2];
-    - ``smoothing_length``: h [length];
+    - ``smoothing_length``, ``rest_density``: of the ``SPH``;
     - ``density`` and ``sound_speed``: means of the pair;
     - the member's own ``parameters``.
 
-    It must not branch (``wp.where``, ``wp.min``), so that the loop over neighbours vectorises.
+    It must not branch (``wp.where``, ``wp.min``), so that the loop over neighbours vectorises. To
+    take energy out, it must have the sign of -``approach``.
+
+    Example:
+        >>> @law
+        ... def linear(approach: float, distance_squared: float, density: float, nu: float):
+        ...     return -10.0 * nu * approach / (density * distance_squared)
+        >>> class Linear(Viscosity):
+        ...     term = linear
+        ...     def __init__(self, nu):
+        ...         self.parameters = {"nu": nu}
+        >>> sorted(SPH(smoothing_length=0.1, rest_density=1.0, equation_of_state=Tait(30.0),
+        ...            viscosity=Linear(1e-6)).parameters)[-1]
+        'viscosity_nu'
     """
 
     term: Law
