@@ -1,7 +1,6 @@
 """The public names, by room: what ``import particlesim`` offers, and where it is."""
 
-from .accuracy.stress.sweep import stress
-from .accuracy.stress.table import Stress
+from .accuracy.stress.sweep import Stress, stress
 from .accuracy.tradeoff.sweep import tradeoff
 from .accuracy.tradeoff.table import Tradeoff
 from .accuracy.tune.report import Tuned
@@ -14,8 +13,7 @@ from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
 from .engine.integrators import Integrator
 from .instruments.ledger.ledger import Ledger
-from .instruments.stability.check import StabilityWarning
-from .instruments.stability.report import Stability
+from .instruments.stability import Stability, StabilityWarning
 from .instruments.watchdog.incident import Incident, SimulationError, SimulationWarning
 from .interactions.fluid.equations_of_state import EquationOfState, Polytrope, Tait
 from .interactions.fluid.sph import SPH
@@ -27,7 +25,7 @@ from .interactions.pair_sum import PairSum
 from .interactions.particle import ConstantForce, Drag, ParticleForce, UniformGravity
 from .interactions.springs import Springs
 from .output.history.writer import History, read_history
-from .output.surface.surface import Surface
+from .output.surface import Surface
 from .output.usd.recorder import UsdRecorder
 from .pictures.render.camera import Camera
 from .scene import __version__, sample

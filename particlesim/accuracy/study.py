@@ -12,7 +12,7 @@ from typing import Any
 
 from .. import validate
 from ..engine.model import batch
-from ..instruments.stability.check import automatic
+from ..instruments.stability import automatic
 from ..output.progress import label
 from ..scene.scene import Scene
 from ..scene.settings import Settings

@@ -9,9 +9,9 @@ import numpy as np
 import warp as wp
 
 from .. import validate
+from ..engine.limit import Limit
 from ..engine.model import Model
-from ..engine.probing.limit import Limit
-from ..engine.probing.probe import Probe
+from ..engine.probe import Probe
 from ..kernels.constraints import boundary_shapes as kernels
 from ..kernels.precision import Precision
 from ..scene.law import law

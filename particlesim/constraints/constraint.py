@@ -12,10 +12,10 @@ import warp as wp
 from .. import validate
 from ..engine import topology
 from ..engine.execution.launch import launch
+from ..engine.limit import Limit
 from ..engine.model import Model
 from ..engine.neighbors.lists import Neighbors
-from ..engine.probing.limit import Limit
-from ..engine.probing.probe import Probe
+from ..engine.probe import Probe
 from ..engine.state import State
 from ..kernels.constraints import constraints as kernels
 from ..scene.law import law as make_law

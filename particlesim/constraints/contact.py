@@ -10,10 +10,10 @@ import warp as wp
 
 from .. import validate
 from ..engine.execution.launch import call, launch, when
+from ..engine.limit import Limit
 from ..engine.model import Model
 from ..engine.neighbors.lists import Neighbors
-from ..engine.probing.limit import Limit
-from ..engine.probing.probe import Probe
+from ..engine.probe import Probe
 from ..engine.state import State
 from ..kernels.constraints import contact as kernels
 from ..kernels.constraints import contact_terms as terms

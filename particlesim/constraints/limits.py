@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..engine.probing.limit import Limit
-from ..engine.probing.probe import Probe
+from ..engine.limit import Limit
+from ..engine.probe import Probe
 
 
 def contact_limits(part: Any, probe: Probe) -> list[Limit]:

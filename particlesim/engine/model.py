@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -184,3 +184,16 @@ class Model:
             for w, (scene, group) in enumerate(zip(self.scenes, groups, strict=True))
         ]
         return np.concatenate(chosen).astype(np.int32)
+
+
+def structure_of(name: str, arrays: Mapping[str, wp.array]) -> Any:
+    """The struct that holds arrays of these types."""
+    return structure(name, {field: wp.array(dtype=each.dtype) for field, each in arrays.items()})
+
+
+def filled(kind: Any, arrays: Mapping[str, wp.array]) -> Any:
+    """An instance of a struct with its arrays set."""
+    result = kind()
+    for name, array in arrays.items():
+        setattr(result, name, array)
+    return result

@@ -10,7 +10,7 @@ import warp as wp
 
 from ..engine.execution.launch import launch
 from ..engine.source import Source
-from ..kernels.engine.reduce import QUANTITIES, block_sums_kernel
+from ..kernels.engine.copy import QUANTITIES, block_sums_kernel
 
 BLOCK = 256  # particles summed by one thread
 

@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 import warp as wp
 
+from ..engine.model import filled
 from ..engine.neighbors.lists import Neighbors
 from ..engine.state import State
-from ..engine.structs import filled
 from ..kernels.interactions import pair as kernels
 from ..kernels.precision import structure
 from ..scene.part import Interaction

@@ -9,11 +9,11 @@ import numpy as np
 import warp as wp
 
 from .. import validate
+from ..engine.limit import Limit
 from ..engine.model import Model
 from ..engine.neighbors.all_pairs import AllPairs
 from ..engine.neighbors.lists import Neighbors
-from ..engine.probing.limit import Limit
-from ..engine.probing.probe import Probe
+from ..engine.probe import Probe
 from ..engine.state import State
 from ..kernels.interactions import pair as kernels
 from ..scene.law import Law

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ..engine.probing.limit import Limit, explicit_step
-from ..engine.probing.probe import Probe
-from ..engine.structs import filled
+from ..engine.limit import Limit, explicit_step
+from ..engine.model import filled
+from ..engine.probe import Probe
 from ..kernels.engine.loops import Pairs
 from ..kernels.interactions.pair import add_force
 

@@ -11,8 +11,7 @@ import warp as wp
 
 from .. import validate
 from ..engine.execution.launch import launch
-from ..engine.model import Model
-from ..engine.structs import filled, structure_of
+from ..engine.model import Model, filled, structure_of
 from ..kernels.interactions.pair import pair_kernel
 from ..scene.law import Law
 

@@ -10,10 +10,9 @@ import warp as wp
 
 from .. import validate
 from ..engine.execution.launch import launch
-from ..engine.model import Model
+from ..engine.model import Model, filled, structure_of
 from ..engine.neighbors.lists import Neighbors
 from ..engine.state import State
-from ..engine.structs import filled, structure_of
 from ..kernels.interactions import particle as kernels
 from ..scene.law import Law, law
 from ..scene.law import law as make_law

@@ -9,10 +9,10 @@ import warp as wp
 
 from ..engine import topology
 from ..engine.execution.launch import launch
+from ..engine.limit import Limit
 from ..engine.model import Model
 from ..engine.neighbors.lists import Neighbors
-from ..engine.probing.limit import Limit
-from ..engine.probing.probe import Probe
+from ..engine.probe import Probe
 from ..engine.state import State
 from ..kernels.interactions import bonded as kernels
 from ..scene.part import Interaction

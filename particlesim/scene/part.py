@@ -66,10 +66,10 @@ class Part:
         """Bounds on the substep at the present state (see ``Simulation.stability``).
 
         Args:
-            probe: A :class:`~particlesim.engine.probing.probe.Probe`.
+            probe: A :class:`~particlesim.engine.probe.Probe`.
 
         Returns:
-            A :class:`~particlesim.engine.probing.limit.Limit` for each.
+            A :class:`~particlesim.engine.limit.Limit` for each.
         """
         return []
 

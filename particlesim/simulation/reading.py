@@ -18,8 +18,7 @@ from ..instruments.diagnostics import Diagnostics, measure
 from ..instruments.explain import Explanation, explain
 from ..instruments.ledger.accounts import Accounts
 from ..instruments.ledger.ledger import Ledger, read
-from ..instruments.stability.check import stability
-from ..instruments.stability.report import Stability
+from ..instruments.stability import Stability, stability
 from ..instruments.watchdog.incident import Incident
 from ..instruments.watchdog.watch import Watchdog
 from ..interactions.fluid.interpolation import interpolate
@@ -30,8 +29,7 @@ from ..pictures.render.image import Image
 from ..scene.part import ConstraintBase, Interaction
 from ..scene.scene import Scene
 from ..scene.settings import Settings
-from .world import Access, World
-from .writer import Writer
+from .access import Access, World, Writer
 
 
 class Reading(Access):

@@ -13,14 +13,14 @@ from ..engine.frames import Frames
 from ..engine.loop import Loop
 from ..engine.model import batch
 from ..instruments.ledger.accounts import Accounts
-from ..instruments.stability.check import automatic, warn_if_past
+from ..instruments.stability import automatic, warn_if_past
 from ..instruments.watchdog.watch import Watchdog
 from ..interactions.fusion import fuse
 from ..output import checkpoint
 from ..scene.scene import Scene
 from ..scene.settings import Settings
+from .access import Writer
 from .reading import Reading
-from .writer import Writer
 
 
 class Simulation(Reading):

@@ -3,7 +3,7 @@
 import pytest
 
 import particlesim as ps
-from particlesim.accuracy.stress.table import Result, Stress
+from particlesim.accuracy.stress.sweep import Result, Stress
 
 
 def swing():

@@ -8,8 +8,8 @@ import pytest
 import particlesim as ps
 from particlesim.accuracy.reference import settled
 from particlesim.accuracy.study import Study
-from particlesim.accuracy.tune.bench import Bench
 from particlesim.accuracy.tune.report import line
+from particlesim.accuracy.tune.search import Bench
 
 
 def oscillator(seed=0):

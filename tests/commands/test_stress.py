@@ -4,7 +4,7 @@ import pytest
 
 import particlesim as ps
 from particlesim import cli
-from particlesim.accuracy.stress.table import Result, Stress
+from particlesim.accuracy.stress.sweep import Result, Stress
 
 
 @pytest.fixture

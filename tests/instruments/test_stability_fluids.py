@@ -7,7 +7,7 @@ import pytest
 
 import particlesim as ps
 from cases.stability import limit, simulation
-from particlesim.engine.probing.probe import Probe
+from particlesim.engine.probe import Probe
 from particlesim.interactions.fluid.limits import steepest
 from particlesim.interactions.fluid.smoothing import SMOOTHING
 

@@ -8,8 +8,8 @@ import warp as wp
 
 import particlesim as ps
 from cases.stability import chain, limit, oscillator, simulation
-from particlesim.engine.probing.limit import Limit, explicit_step
-from particlesim.engine.probing.spectrum import largest
+from particlesim.engine.limit import Limit, explicit_step
+from particlesim.engine.spectrum import largest
 from particlesim.interactions.springs import spring_bound
 
 

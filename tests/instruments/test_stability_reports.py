@@ -11,7 +11,7 @@ import warp as wp
 import particlesim as ps
 from cases.stability import chain, grains, oscillator, simulation
 from particlesim.commands.scene_files import ready_scenes
-from particlesim.instruments.stability.check import StabilityWarning
+from particlesim.instruments.stability import StabilityWarning
 
 SMALL = {
     "dam_break": {"spacing": 0.05},

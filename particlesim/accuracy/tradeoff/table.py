@@ -13,9 +13,8 @@ import numpy as np
 from ... import validate
 from ..table import amount
 from . import output
-from .order import fitted_order
 from .plot import plot
-from .row import Row
+from .row import Row, fitted_order
 
 STEPS = ("dt",)  # of these less is finer
 

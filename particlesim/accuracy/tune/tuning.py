@@ -14,9 +14,8 @@ from ... import validate
 from ...scene.settings import INTEGRATORS, PRECISIONS, Settings
 from ..reference import settled
 from ..study import KNOBS, Study
-from .bench import Bench
 from .report import Trial, Tuned
-from .search import BETTER, Search, levels
+from .search import BETTER, Bench, Search, levels
 
 OWNER = "tune"
 FINEST = 4096  # times the fewest substeps, and at least as many: what is tried at most

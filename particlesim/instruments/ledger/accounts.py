@@ -32,10 +32,9 @@ import warp as wp
 
 from ...engine.execution.launch import launch, owner
 from ...engine.loop import Loop
-from ...engine.model import Model
+from ...engine.model import Model, filled
 from ...engine.observers import FORCE, PROJECT, Observer
 from ...engine.state import State
-from ...engine.structs import filled
 from ...kernels.engine.copy import copy_kernel, zero_kernel
 from ...kernels.instruments.ledger import TOTALS, account_kernel, change_kernel, ledger_type
 from ..diagnostics import blocks

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...engine.probing.limit import Limit, explicit_step
-from ...engine.probing.probe import Probe
+from ...engine.limit import Limit, explicit_step
+from ...engine.probe import Probe
 from .smoothing import SUPPORT, Smoothing
 from .viscosities import ArtificialViscosity
 

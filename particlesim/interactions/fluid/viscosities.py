@@ -6,7 +6,7 @@ import warp as wp
 
 from ... import validate
 from ...scene.law import Law, law
-from .fluid_part import FluidPart
+from .equations_of_state import FluidPart
 
 
 class Viscosity(FluidPart):

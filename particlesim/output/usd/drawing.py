@@ -13,7 +13,7 @@ from ...engine.source import Source
 from ...interactions.fluid.sph import SPH
 from ...scene.group import Group, select
 from ...scene.scene import Scene
-from ..surface.surface import Mesh, Surface
+from ..surface import Mesh, Surface
 from .description import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
 from .placement import closed, offsets, periodic_box
 
@@ -61,7 +61,7 @@ class Drawing:
         layout: None, ``"grid"``, or (3,) [length] from one world to the next.
         instancer: Spheres of a PointInstancer instead of Points.
         surface: Draw the members of each SPH as one surface instead; options of
-            :class:`~particlesim.output.surface.surface.Surface`, or True for none.
+            :class:`~particlesim.output.surface.Surface`, or True for none.
     """
 
     def __init__(

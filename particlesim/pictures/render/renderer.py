@@ -13,11 +13,10 @@ from ...kernels.pictures import shade as render_shade
 from ...kernels.pictures.light import Light
 from . import look as looks
 from .camera import Camera, view_axes
-from .crew import Crew
 from .geometry import Geometry
 from .image import Image
 from .look import Look
-from .screen import Screen, make_view, placed
+from .screen import Crew, Screen, make_view, placed
 
 SHADOW_SIZE = 1024  # samples along a side of the shadow map
 OCCLUSION_SAMPLES = 8

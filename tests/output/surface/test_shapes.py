@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from particlesim.output.surface.surface import LEVEL
+from particlesim.output.surface import LEVEL
 
 RATIO = 1.3  # h over the spacing
 SMOOTH = [0.0, 0.25, 0.5, 0.75, 1.0]

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ... import validate
-from ...engine.source import Source
-from ...interactions.fluid.sph import SPH
-from ...scene.group import Group, select
-from ...scene.scene import Scene
+from .. import validate
+from ..engine.source import Source
+from ..interactions.fluid.sph import SPH
+from ..scene.group import Group, select
+from ..scene.scene import Scene
 
 Mesh = tuple[np.ndarray, np.ndarray, np.ndarray]
 SPACINGS = 1.3  # particle spacings in a smoothing length, where only the particles' size is known

@@ -9,11 +9,11 @@ from typing import Any, Self
 import numpy as np
 import warp as wp
 
-from ...engine.probing.limit import Limit, explicit_step
-from ...scene.part import Interaction
-from ..execution.launch import owner
-from ..loop import Loop
-from ..model import Model
+from ..scene.part import Interaction
+from .execution.launch import owner
+from .limit import Limit, explicit_step
+from .loop import Loop
+from .model import Model
 from .spectrum import Largest, largest
 
 STEPS = 30  # applications of a Jacobian, two evaluations of the force each

@@ -9,8 +9,10 @@ import numpy as np
 
 from .. import validate
 from ..engine.frames import Frames
+from ..engine.loop import Loop
 from ..instruments.ledger.accounts import Accounts, motion
 from ..instruments.watchdog.watch import Watchdog
+from ..scene.scene import Scene
 
 
 class Writer:
@@ -85,3 +87,68 @@ class Writer:
         if self.accounts is not None:
             self.accounts.begin_anew(chosen)
         loop.unknown_forces.update(chosen)
+
+
+class Access:
+    """Per-particle arrays by name: a member says which rows."""
+
+    def get(self, name: str) -> np.ndarray:
+        """A per-particle array, copied to the host."""
+        raise NotImplementedError
+
+    def set(self, name: str, value: Any) -> None:
+        """Write a per-particle array; what was derived from it is forgotten."""
+        raise NotImplementedError
+
+    @property
+    def position(self) -> np.ndarray:
+        """Positions, (n, 3), a copy on the host; of all worlds, one after the other."""
+        return self.get("position")
+
+    @position.setter
+    def position(self, value: Any) -> None:
+        self.set("position", value)
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Velocities, (n, 3), a copy on the host; of all worlds, one after the other."""
+        return self.get("velocity")
+
+    @velocity.setter
+    def velocity(self, value: Any) -> None:
+        self.set("velocity", value)
+
+
+class World(Access):
+    """One world of a batch: its rows of the simulation's arrays."""
+
+    def __init__(self, loop: Loop, writer: Writer, index: int):
+        count = loop.model.world_count
+        validate.whole("Simulation.world", "index", index)
+        if index >= count:
+            raise validate.fail(
+                "Simulation.world", "index", f"be from 0 to {count - 1}", index,
+                "name a world of this simulation",
+            )  # fmt: skip
+        self._loop, self._writer, self.index = loop, writer, index
+        self.rows = loop.model.rows(index)
+
+    @property
+    def scene(self) -> Scene:
+        """The scene that the world was made of."""
+        return self._loop.scenes[self.index]
+
+    def get(self, name: str) -> np.ndarray:
+        """A per-particle array of this world, copied to the host."""
+        array = self._loop.state[name]
+        if self.rows.start == self.rows.stop:  # Warp has no empty slice at an array's end
+            return array.numpy()[self.rows].copy()
+        return array[self.rows].numpy().copy()
+
+    def set(self, name: str, value: Any) -> None:
+        """Write a per-particle array of this world."""
+        self._writer.set(name, value, self.rows)
+
+    def reset(self) -> None:
+        """Put this world back to its start."""
+        self._writer.reset([self.index])

@@ -1,1 +1,0 @@
-"""Limits before a run: the largest safe substep of every part of a simulation."""

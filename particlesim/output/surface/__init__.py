@@ -1,5 +1,0 @@
-"""Surfaces of fluids as meshes."""
-
-from .surface import Surface
-
-__all__ = ["Surface"]
