@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from .. import validate
 from ..output.files import whole
 
 
@@ -49,25 +48,6 @@ def amount(value: float, step: int = 1000) -> str:
         value /= step
     binary = "i" if prefix and step == 1024 else ""
     return f"{value:.3g} {prefix.upper() if binary else prefix}{binary}"
-
-
-def check_new(
-    owner: str,
-    argument: str,
-    path: Path,
-    formats: Sequence[str],
-    overwrite: bool,
-    consent: str = "overwrite it",
-) -> None:
-    """Refuse a file of another suffix, and one that exists."""
-    if path.suffix.lower() not in formats:
-        raise validate.fail(
-            owner, argument, f"end in {', '.join(formats)}", str(path), "choose one of these"
-        )
-    if path.exists() and not overwrite:
-        raise validate.fail(
-            owner, argument, "be a new file", str(path), f"choose another or {consent}"
-        )
 
 
 def write(owner: str, path: Path, content: bytes) -> None:

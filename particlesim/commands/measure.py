@@ -142,14 +142,28 @@ def stress(
 
 def _check_outputs(picture: Path | None, table: Path | None, overwrite: bool) -> None:
     """Find out before a long sweep what would stop it from being written."""
-    from ..accuracy.table import check_new
     from ..accuracy.tradeoff import output, plot
+    from ..output.files import check_new
 
     consent = "give --overwrite"
     if table is not None:
-        check_new("tradeoff", "--save", table, output.FORMATS, overwrite, consent)
+        check_new(
+            "tradeoff",
+            table,
+            overwrite,
+            suffixes=output.FORMATS,
+            argument="--save",
+            consent=consent,
+        )
     if picture is not None:
-        check_new("tradeoff", "--plot", picture, plot.FORMATS, overwrite, consent)
+        check_new(
+            "tradeoff",
+            picture,
+            overwrite,
+            suffixes=plot.FORMATS,
+            argument="--plot",
+            consent=consent,
+        )
         plot.figure_class()
 
 

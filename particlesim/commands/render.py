@@ -13,6 +13,7 @@ import numpy as np
 import typer
 
 from .. import validate
+from ..output import files
 from ..output.progress import Meter
 from ..pictures.render import film, image
 from ..pictures.render.camera import FIELD_OF_VIEW, Camera
@@ -128,7 +129,9 @@ class Request:
     def __post_init__(self) -> None:
         validate.choice(OWNER, "engine", self.engine, ENGINES)
         formats = (*image.FORMATS, *film.FORMATS)
-        image.check_output(OWNER, self.out, formats, self.overwrite, "give --overwrite")
+        files.check_new(
+            OWNER, self.out, self.overwrite, suffixes=formats, consent="give --overwrite"
+        )
         if not self.is_film and self.frames is not None:
             raise validate.fail(
                 OWNER, "--frames", "be of a film, .gif or .mp4", str(self.out),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import warp as wp
@@ -36,12 +36,13 @@ class Loop:
     def __init__(
         self, scenes: Sequence[Scene], settings: Settings, device: Any = None, fuse: Fuse = list
     ):
-        self.scenes, self.settings = list(scenes), settings
+        self.scenes: Sequence[Scene] = list(scenes)
+        self.settings = settings
         self.model = model = Model(scenes, settings, device)
         self.frame = 0
         # What is prepared allocates only what it requires.
-        self.interactions: list[Interaction] = _bound([each.interactions for each in scenes])
-        self.constraints: list[ConstraintBase] = _bound([each.constraints for each in scenes])
+        self.interactions: Sequence[Interaction] = _bound([each.interactions for each in scenes])
+        self.constraints: Sequence[ConstraintBase] = _bound([each.constraints for each in scenes])
         self.state, self.neighbors = State(model), Neighbors(model)
         for part in self.parts:
             part.prepare(model, self.neighbors)
@@ -60,7 +61,7 @@ class Loop:
         self.neighbors.allocate(self.state)
         for part in self.parts:
             part.attach(model, self.state)
-        self.passes = fuse(self.interactions)
+        self.passes: Sequence[Interaction] = fuse(self.interactions)
         self.observers = Observers()
         self.unknown_forces = set(range(model.world_count))  # worlds, for a first kick
 
@@ -161,3 +162,36 @@ class Loop:
 def _bound(parts: Sequence[Sequence[Any]]) -> list[Any]:
     """One part for all worlds, from the corresponding ones of the scenes."""
     return [peers[0].bind(peers) for peers in zip(*parts, strict=True)]
+
+
+class Source(Protocol):
+    """What recorders, histories and pictures read: a simulation has it, and so has its loop."""
+
+    scenes: Sequence[Scene]  # one for each world
+    settings: Settings
+    model: Model
+    state: State
+    neighbors: Neighbors
+    interactions: Sequence[Interaction]  # of all worlds, bound
+    constraints: Sequence[ConstraintBase]
+
+    @property
+    def frame(self) -> int:
+        """Frames since the start."""
+
+    @property
+    def time(self) -> float:
+        """Since the start [s]."""
+
+    def get(self, name: str) -> np.ndarray:
+        """A per-particle array, copied to the host."""
+
+
+class Runner(Source, Protocol):
+    """A source that can be moved on."""
+
+    def step(self) -> None:
+        """Advance by one frame."""
+
+    def reset(self) -> None:
+        """Back to the start."""

@@ -79,7 +79,7 @@ class Snapshot:
     # World by world ---------------------------------------------------------------------------
 
     def by_world(self) -> dict[str, tuple[wp.array, np.ndarray]]:
-        """The arrays by their names, each with the world of every row; without what is no world's."""
+        """The arrays whose rows are worlds' own, each with the world of every row."""
         result = {}
         for name, array in self.contents().items():
             world = self._worlds(name, array)

@@ -9,7 +9,7 @@ import numpy as np
 import warp as wp
 
 from ..engine.execution.launch import launch
-from ..engine.source import Source
+from ..engine.loop import Source
 from ..kernels.engine.copy import QUANTITIES, block_sums_kernel
 
 BLOCK = 256  # particles summed by one thread

@@ -17,6 +17,10 @@ from .. import validate
 FREE = "free some space or choose another folder"
 
 
+class OutputExists(FileExistsError, ValueError):
+    """An output would replace what is there: a fault of the disk as much as of the argument."""
+
+
 def check_new(
     owner: str,
     path: str | os.PathLike[str],
@@ -40,7 +44,7 @@ def check_new(
 
     Raises:
         ValueError: Another suffix. FileNotFoundError: The folder does not exist.
-        IsADirectoryError: The path is a folder. FileExistsError: Something of the output exists.
+        IsADirectoryError: The path is a folder. OutputExists: Something of the output exists.
 
     Example:
         >>> check_new("History", "run.csv", False, suffixes=(".csv", ".jsonl")).name
@@ -60,7 +64,7 @@ def check_new(
         )
     existing = () if overwrite else [each for each in (target, *beside) if each.exists()]
     if existing:
-        raise FileExistsError(
+        raise OutputExists(
             f"{owner}: {argument} must be a new file, got {shown!r} where {existing[0].name!r} "
             f"exists; choose another, or {consent}."
         )

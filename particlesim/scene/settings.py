@@ -136,7 +136,7 @@ class Settings:
 
     @property
     def plain(self) -> dict[str, Any]:
-        """The knobs by name, as they can be written down: an integrator of one's own by its name."""
+        """The knobs as they can be written down: an integrator of one's own by its name."""
         values = dataclasses.asdict(self)
         if isinstance(self.integrator, type):
             values["integrator"] = self.integrator.__name__

@@ -43,51 +43,23 @@ class Reading(Access):
     watchdog: Watchdog
     accounts: Accounts | None
     writer: Writer
+    # Of the loop; settings have numbers in the place of what was "auto".
+    scenes: Sequence[Scene]
+    settings: Settings
+    model: Model
+    device: Any
+    state: State
+    neighbors: Neighbors
+    interactions: Sequence[Interaction]
+    constraints: Sequence[ConstraintBase]
+    integrator: Integrator
 
-    @property
-    def scenes(self) -> Sequence[Scene]:
-        """The scenes, one for each world."""
-        return self.loop.scenes
-
-    @property
-    def settings(self) -> Settings:
-        """The knobs, with numbers in the place of what was ``"auto"``."""
-        return self.loop.settings
-
-    @property
-    def model(self) -> Model:
-        """Worlds, particles, device and precision."""
-        return self.loop.model
-
-    @property
-    def device(self) -> Any:
-        """The Warp device."""
-        return self.loop.model.device
-
-    @property
-    def state(self) -> State:
-        """The per-particle arrays on the device."""
-        return self.loop.state
-
-    @property
-    def neighbors(self) -> Neighbors:
-        """The pair lists."""
-        return self.loop.neighbors
-
-    @property
-    def interactions(self) -> Sequence[Interaction]:
-        """The interactions, each bound to all worlds."""
-        return self.loop.interactions
-
-    @property
-    def constraints(self) -> Sequence[ConstraintBase]:
-        """The constraints, each bound to all worlds."""
-        return self.loop.constraints
-
-    @property
-    def integrator(self) -> Integrator:
-        """What moves the particles."""
-        return self.loop.integrator
+    def _show(self, loop: Loop) -> None:
+        """Have what the loop is made of at hand, by the same names."""
+        self.loop, self.scenes, self.settings = loop, loop.scenes, loop.settings
+        self.model, self.device, self.state = loop.model, loop.model.device, loop.state
+        self.neighbors, self.integrator = loop.neighbors, loop.integrator
+        self.interactions, self.constraints = loop.interactions, loop.constraints
 
     @property
     def incidents(self) -> list[Incident]:
@@ -204,7 +176,7 @@ class Reading(Access):
             height: In pixels.
             camera: None: one that sees all.
             color: Name of a value to colour particles by, as ``color_by`` of
-                :class:`~particlesim.output.usd.recorder.UsdRecorder`; None: each group has its own colour.
+                ``ps.UsdRecorder``; None: each group has its own colour.
             **options: ``color_map``, ``color_range``, ``worlds``, ``groups``, ``layout`` and
                 ``surface`` as of UsdRecorder, but worlds stand side by side; ``ground``: True,
                 False or a height [length], None: where there are boundaries; ``background``

@@ -61,7 +61,7 @@ class Simulation(Reading):
         if settings.automatic:
             settings = automatic(scenes, settings, device)
         # A ledger keeps account of every part by itself.
-        self.loop = Loop(scenes, settings, device, list if settings.ledger else fuse)
+        self._show(Loop(scenes, settings, device, list if settings.ledger else fuse))
         self.accounts = None
         if settings.ledger:
             self.accounts = Accounts(self.loop)
@@ -121,7 +121,7 @@ class Simulation(Reading):
             fields: Names of further per-particle arrays to record.
             progress: True for a bar on the terminal, or a function of (frame, frames).
             history: Path of a ``.csv`` or ``.jsonl`` file to write energies, momenta and errors of
-                the start and every frame to (see :class:`~particlesim.output.history.writer.History`).
+                the start and every frame to (see ``ps.History``).
             checkpoint: Frames from one checkpoint to the next; 0: none. None: by the clock, at
                 less than 2 % of the time.
             resume: Go on with the run that recorded to ``record``; where there is none, start it.
@@ -138,8 +138,9 @@ class Simulation(Reading):
         validate.whole("Simulation.run", "frames", frames)
         warn_if_past(self.loop)
         run(
-            self, self.step, frames, record=record, progress=progress, history=history, overwrite=overwrite,
-            checkpoint=checkpoint, resume=resume, fields=tuple(fields), **options,
+            self, self.step, frames, record=record, progress=progress, history=history,
+            overwrite=overwrite, checkpoint=checkpoint, resume=resume, fields=tuple(fields),
+            **options,
         )  # fmt: skip
 
     def project(self, iterations: int) -> None:

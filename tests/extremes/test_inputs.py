@@ -30,7 +30,7 @@ PARTS = {
         "law": above, "friction": 0.1, "restitution": 0.5, "velocity": (0, 1, 0),
         "angular_velocity": (0, 0, 1), "pivot": (0, 1, 0), "drawn": ((0, 0, 0), (1, 1, 1)),
         "level": 0.0,
-    },  # fmt: skip
+    },
     ps.BoxBoundary: {"lower": (0, 0, 0), "upper": (1, 1, 1), "friction": 0.1, "restitution": 0.5},
     ps.ConstantForce: {"force": (0, 1, 0)},
     ps.Constraint: {
@@ -61,7 +61,8 @@ NEVER = {
     (ps.Constraint, "break_force"),
     (ps.Distance, "break_force"),
 }  # may be infinite: unbreakable
-SIGNED = {"velocity", "angular_velocity", "pivot", "drawn", "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
+SIGNED = {"velocity", "angular_velocity", "pivot", "drawn",
+          "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
           "periodic", "G"}  # fmt: skip
 
 

@@ -11,7 +11,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..table import amount, check_new, grid, shown, write
+from ...output.files import check_new
+from ..table import amount, grid, shown, write
 from .row import Row
 
 FORMATS = (".json", ".csv")
@@ -22,7 +23,7 @@ def save(
 ) -> None:
     """Write rows as the suffix says (see :meth:`Tradeoff.save`)."""
     owner = "Tradeoff.save"
-    check_new(owner, "path", path, FORMATS, overwrite)
+    check_new(owner, path, overwrite, suffixes=FORMATS)
     is_json = path.suffix.lower() == ".json"
     content = as_json(about, rows, front) if is_json else as_csv(rows, front)
     write(owner, path, content.encode())

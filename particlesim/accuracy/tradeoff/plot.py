@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..table import check_new, shown, write
+from ...output.files import check_new
+from ..table import shown, write
 from .row import Row
 
 FORMATS = (".png", ".svg", ".pdf")
@@ -40,7 +41,7 @@ def plot(
 ) -> None:
     """Draw rows (see :meth:`Tradeoff.plot`); ``about``: the title, and what the error is."""
     owner = "Tradeoff.plot"
-    check_new(owner, "path", path, FORMATS, overwrite)
+    check_new(owner, path, overwrite, suffixes=FORMATS)
     figure = figure_class()(figsize=(7.0, 4.6), layout="constrained")
     axes = figure.add_subplot()
     # The lines follow the knob with the most values.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ...engine.source import Source
+from ...engine.loop import Source
 from ...instruments.diagnostics import measure
 from ...instruments.residuals import residuals
 from ...interactions.fluid.sph import SPH

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ... import validate
-from ...engine.source import Source
+from ...engine.loop import Source
 from .. import files
 from ..fields import ParticleFields
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import io
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ... import validate
+from ...output import files
 
 FORMATS = (".png", ".jpg", ".jpeg", ".webp")
 
@@ -52,13 +52,10 @@ class Image:
             ImportError: Pillow is not installed.
             ValueError: Another suffix.
         """
-        target = check_output("Image.save", path, FORMATS, overwrite)
-        temporary = target.with_name(f".{target.name}.tmp")
-        try:
-            temporary.write_bytes(self.encoded(target.suffix.lower()[1:]))
-            os.replace(temporary, target)
-        finally:
-            temporary.unlink(missing_ok=True)
+        target = files.check_new("Image.save", path, overwrite, suffixes=FORMATS)
+        content = self.encoded(target.suffix.lower()[1:])
+        with files.whole("Image.save", target) as temporary:
+            temporary.write_bytes(content)
 
     def encoded(self, kind: str) -> bytes:
         """The file's bytes, of kind ``png``, ``jpg``, ``jpeg`` or ``webp``."""
@@ -81,35 +78,4 @@ def pillow() -> Any:
     Raises:
         ImportError: It is not installed.
     """
-    try:
-        from PIL import Image as module
-    except ModuleNotFoundError:
-        raise ImportError(
-            "Image: Pillow must be installed, got none; pip install 'particlesim[render]'."
-        ) from None
-    return module
-
-
-def check_output(
-    owner: str,
-    path: str | os.PathLike[str],
-    formats: tuple[str, ...],
-    overwrite: bool,
-    consent: str = "pass overwrite=True",
-) -> Path:
-    """The path, if it can be written there: a known suffix, a folder, and nothing to lose."""
-    target = Path(path)
-    if target.suffix.lower() not in formats:
-        raise validate.fail(
-            owner, "path", f"end in {', '.join(formats)}", str(path), "choose one of these"
-        )
-    if not target.parent.is_dir():
-        raise FileNotFoundError(
-            f"{owner}: path must be in an existing folder, got {str(path)!r}; make it first."
-        )
-    if target.exists() and not overwrite:
-        raise FileExistsError(
-            f"{owner}: path must be a new file, got {str(path)!r}, which exists; "
-            f"choose another or {consent}."
-        )
-    return target
+    return validate.installed("Image", "PIL.Image", "render")

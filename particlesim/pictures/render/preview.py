@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from ... import validate
-from ...engine.source import Source
+from ...engine.loop import Source
+from ...output import files
 from .camera import Camera
 from .geometry import Geometry
-from .image import FORMATS, Image, check_output, pillow
+from .image import FORMATS, Image, pillow
 from .look import BACKGROUND, Look
 from .renderer import Renderer
 from .stage import View
@@ -43,7 +44,7 @@ def render(
 ) -> Image:
     """A picture of a simulation as it is now (see :meth:`Simulation.render`)."""
     if path is not None:
-        check_output("Simulation.render", path, FORMATS, overwrite)
+        files.check_new("Simulation.render", path, overwrite, suffixes=FORMATS)
     if camera is not None and not isinstance(camera, Camera):
         raise TypeError(
             f"Simulation.render: camera must be a Camera, got {camera!r}; use Camera(...)."

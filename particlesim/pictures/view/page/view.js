@@ -1,8 +1,7 @@
 // The page: state, time, and what goes on between the controls, the server and the picture.
 
 import { Film, ask, unpack } from "./film.js";
-import { listen } from "./keys.js";
-import { Panel, element } from "./panel.js";
+import { Panel, element, listen } from "./panel.js";
 import { Screen } from "./screen.js";
 
 const AHEAD = 8; // frames fetched before they are due
