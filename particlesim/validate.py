@@ -164,10 +164,11 @@ def installed(owner: str, module: str, extra: str) -> Any:
     Raises:
         ImportError: It is not there.
     """
+    package = module.partition(".")[0]
     try:
+        importlib.import_module(package)
         return importlib.import_module(module)
     except ImportError:
-        package = module.partition(".")[0]
         raise ImportError(
             f"{owner}: {package} must be installed, got none; pip install 'particlesim[{extra}]'."
         ) from None

@@ -76,18 +76,11 @@ class Boundary(Holding):
     law: Law  # of the class, where that has a surface of its own
 
     def __init__(
-        self,
-        law: Any,
-        friction: float = 0.0,
-        restitution: float = 0.0,
-        group: Any = None,
-        *,
-        velocity: Sequence[float] = STILL,
-        angular_velocity: Sequence[float] = STILL,
+        self, law: Any, friction: float = 0.0, restitution: float = 0.0, group: Any = None, *,
+        velocity: Sequence[float] = STILL, angular_velocity: Sequence[float] = STILL,
         pivot: Sequence[float] = STILL,
-        drawn: tuple[Sequence[float], Sequence[float]] | None = None,
-        **parameters: Any,
-    ):
+        drawn: tuple[Sequence[float], Sequence[float]] | None = None, **parameters: Any,
+    ):  # fmt: skip
         self._holds(friction, restitution, group, velocity, angular_velocity)
         self.pivot = validate.vector(self.name, "pivot", pivot, unit="length")
         self.law = make_law(law)
@@ -96,13 +89,9 @@ class Boundary(Holding):
         self._box = None if drawn is None else self._corners(drawn)
 
     def _holds(
-        self,
-        friction: float,
-        restitution: float,
-        group: Any,
-        velocity: Sequence[float],
+        self, friction: float, restitution: float, group: Any, velocity: Sequence[float],
         angular_velocity: Sequence[float],
-    ) -> None:
+    ) -> None:  # fmt: skip
         """What boundaries of every surface are made with."""
         self.group = group
         self.friction = validate.number(self.name, "friction", friction, minimum=0.0)

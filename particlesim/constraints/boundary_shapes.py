@@ -52,16 +52,10 @@ class PlaneBoundary(Boundary):
     law = _half_space
 
     def __init__(
-        self,
-        point: Sequence[float],
-        normal: Sequence[float],
-        friction: float = 0.0,
-        restitution: float = 0.0,
-        group: Any = None,
-        *,
-        velocity: Sequence[float] = STILL,
+        self, point: Sequence[float], normal: Sequence[float], friction: float = 0.0,
+        restitution: float = 0.0, group: Any = None, *, velocity: Sequence[float] = STILL,
         angular_velocity: Sequence[float] = STILL,
-    ):
+    ):  # fmt: skip
         self._holds(friction, restitution, group, velocity, angular_velocity)
         self.point = validate.vector(self.name, "point", point, unit="length")
         given = validate.vector(self.name, "normal", normal)
@@ -136,16 +130,10 @@ class BoxBoundary(Boundary):
     sides = 3
 
     def __init__(
-        self,
-        lower: Sequence[float],
-        upper: Sequence[float],
-        friction: float = 0.0,
-        restitution: float = 0.0,
-        group: Any = None,
-        *,
-        velocity: Sequence[float] = STILL,
+        self, lower: Sequence[float], upper: Sequence[float], friction: float = 0.0,
+        restitution: float = 0.0, group: Any = None, *, velocity: Sequence[float] = STILL,
         angular_velocity: Sequence[float] = STILL,
-    ):
+    ):  # fmt: skip
         self._holds(friction, restitution, group, velocity, angular_velocity)
         self.lower = self._corner("lower", lower, -np.inf)
         self.upper = self._corner("upper", upper, np.inf)
@@ -235,17 +223,10 @@ class SphereBoundary(Boundary):
     law = _ball
 
     def __init__(
-        self,
-        center: Sequence[float],
-        radius: float,
-        inside: bool = True,
-        friction: float = 0.0,
-        restitution: float = 0.0,
-        group: Any = None,
-        *,
-        velocity: Sequence[float] = STILL,
+        self, center: Sequence[float], radius: float, inside: bool = True, friction: float = 0.0,
+        restitution: float = 0.0, group: Any = None, *, velocity: Sequence[float] = STILL,
         angular_velocity: Sequence[float] = STILL,
-    ):
+    ):  # fmt: skip
         self._holds(friction, restitution, group, velocity, angular_velocity)
         self.center = validate.vector(self.name, "center", center, unit="length")
         self.radius = validate.number(self.name, "radius", radius, above=0.0, unit="length")

@@ -75,16 +75,9 @@ class Constraint(ConstraintBase):
     unit = False  # its gradients have unit length
 
     def __init__(
-        self,
-        law: Any,
-        particles: Any,
-        *,
-        compliance: Any = 0.0,
-        damping: Any = 0.0,
-        inequality: bool = False,
-        break_force: Any = None,
-        **parameters: Any,
-    ):
+        self, law: Any, particles: Any, *, compliance: Any = 0.0, damping: Any = 0.0,
+        inequality: bool = False, break_force: Any = None, **parameters: Any,
+    ):  # fmt: skip
         self.law = make_law(law)
         self.law.check_derivable(self.name)
         size = self._size(parameters)

@@ -62,13 +62,9 @@ class Contact(EasedConstraint):
     requires = frozenset({"position", "velocity", "inverse_mass", "radius", "correction"})
 
     def __init__(
-        self,
-        group: Any = None,
-        friction: float = 0.0,
-        restitution: float = 0.0,
-        *,
+        self, group: Any = None, friction: float = 0.0, restitution: float = 0.0, *,
         compliance: float = 0.0,
-    ):
+    ):  # fmt: skip
         name = self.name
         self.group = group
         self.friction = validate.number(name, "friction", friction, minimum=0.0)

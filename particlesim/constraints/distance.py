@@ -49,16 +49,9 @@ class Distance(Constraint):
     unit = True
 
     def __init__(
-        self,
-        pairs: Any,
-        rest_length: Any = None,
-        *,
-        compliance: Any = 0.0,
-        damping: Any = 0.0,
-        inequality: bool = False,
-        tension_only: bool = False,
-        break_force: Any = None,
-    ):
+        self, pairs: Any, rest_length: Any = None, *, compliance: Any = 0.0, damping: Any = 0.0,
+        inequality: bool = False, tension_only: bool = False, break_force: Any = None,
+    ):  # fmt: skip
         if inequality and tension_only:
             raise validate.fail(
                 self.name, "tension_only", "be False with inequality", tension_only,

@@ -20,17 +20,10 @@ from .resume import OWNER, Checkpoints
 
 
 def run(
-    sim: Reading,
-    step: Callable[[], None],
-    frames: int,
-    *,
-    record: Any,
-    progress: bool | Callable[[int, int], None],
-    history: Any,
-    overwrite: bool,
-    resume: bool,
+    sim: Reading, step: Callable[[], None], frames: int, *, record: Any,
+    progress: bool | Callable[[int, int], None], history: Any, overwrite: bool, resume: bool,
     **options: Any,
-) -> None:
+) -> None:  # fmt: skip
     """Advance by ``frames`` frames (see :meth:`Simulation.run`)."""
     first = sim.frame
     if history is not None:
@@ -78,16 +71,9 @@ class Recording:
     """
 
     def __init__(
-        self,
-        sim: Reading,
-        frames: int,
-        record: Any,
-        *,
-        overwrite: bool = False,
-        checkpoint: int | None = None,
-        resume: bool = False,
-        **options: Any,
-    ):
+        self, sim: Reading, frames: int, record: Any, *, overwrite: bool = False,
+        checkpoint: int | None = None, resume: bool = False, **options: Any,
+    ):  # fmt: skip
         self.sim, path = sim, Path(record)
         _check(overwrite, checkpoint, resume)
         first, end = sim.frame, sim.frame + frames

@@ -82,16 +82,10 @@ class SPH(Interaction):
     requires = frozenset({"force", "velocity", "mass", "density", "pressure"})
 
     def __init__(
-        self,
-        group: Any = None,
-        *,
-        smoothing_length: float,
-        equation_of_state: EquationOfState,
-        rest_density: float | None = None,
-        smoothing: str = "wendland_c2",
-        viscosity: Viscosity | None = None,
-        dimension: int = 3,
-    ):
+        self, group: Any = None, *, smoothing_length: float, equation_of_state: EquationOfState,
+        rest_density: float | None = None, smoothing: str = "wendland_c2",
+        viscosity: Viscosity | None = None, dimension: int = 3,
+    ):  # fmt: skip
         self.group = group
         h = validate.number(
             self.name, "smoothing_length", smoothing_length, above=0.0, unit="length"

@@ -33,13 +33,9 @@ class Recorder(files.Closing):
     """
 
     def __init__(
-        self,
-        sim: Source,
-        path: str | os.PathLike[str],
-        frames: int,
-        fields: Iterable[str],
+        self, sim: Source, path: str | os.PathLike[str], frames: int, fields: Iterable[str],
         every: int,
-    ):
+    ):  # fmt: skip
         self.owner = type(self).__name__
         self.sim, self.path = sim, Path(path)
         self.every = validate.whole(self.owner, "every", every, minimum=1)
@@ -118,16 +114,10 @@ class ParticleRecorder(Recorder):
     suffix = ""
 
     def __init__(
-        self,
-        sim: Source,
-        path: str | os.PathLike[str],
-        *,
-        frames: int = 1,
-        fields: Iterable[str] = (),
-        every: int = 1,
-        overwrite: bool = False,
+        self, sim: Source, path: str | os.PathLike[str], *, frames: int = 1,
+        fields: Iterable[str] = (), every: int = 1, overwrite: bool = False,
         resume: int | None = None,
-    ):
+    ):  # fmt: skip
         super().__init__(sim, path, frames, fields, every)
         for name in self.fields.names:
             if name in COLUMNS or name == "time":

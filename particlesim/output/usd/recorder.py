@@ -81,25 +81,14 @@ class UsdRecorder(Recorder):
     """
 
     def __init__(
-        self,
-        sim: Source,
-        path: str | os.PathLike[str],
-        *,
-        frames: int = 1,
-        fields: Iterable[str] = (),
-        fps: float | None = None,
-        overwrite: bool = False,
-        worlds: Iterable[int] | None = None,
-        groups: Iterable[Any] | None = None,
-        layout: Any = None,
-        every: int = 1,
-        color_by: str | None = None,
-        color_map: Any = "viridis",
-        color_range: tuple[float, float] | None = None,
-        instancer: bool = False,
-        surface: bool | Mapping[str, Any] = False,
+        self, sim: Source, path: str | os.PathLike[str], *, frames: int = 1,
+        fields: Iterable[str] = (), fps: float | None = None, overwrite: bool = False,
+        worlds: Iterable[int] | None = None, groups: Iterable[Any] | None = None,
+        layout: Any = None, every: int = 1, color_by: str | None = None,
+        color_map: Any = "viridis", color_range: tuple[float, float] | None = None,
+        instancer: bool = False, surface: bool | Mapping[str, Any] = False,
         resume: int | None = None,
-    ):
+    ):  # fmt: skip
         super().__init__(sim, path, frames, fields, every)
         first, last = -(-sim.frame // self.every), (sim.frame + frames) // self.every
         self.drawing = Drawing(

@@ -73,16 +73,16 @@ class Shape:
 
     @classmethod
     def sphere(
-        cls, center: Any, radius: float, world: int = 0, name: str = "sphere", container: bool = True,
-        moving: bool = False,
+        cls, center: Any, radius: float, world: int = 0, name: str = "sphere",
+        container: bool = True, moving: bool = False,
     ) -> Shape:  # fmt: skip
         """The sphere around ``center`` [length]."""
         return cls(world, name, "sphere", (center, radius), container, moving=moving)
 
     @classmethod
     def mesh(
-        cls, points: Any, triangles: Any, world: int = 0, name: str = "mesh", container: bool = False,
-        moving: bool = False,
+        cls, points: Any, triangles: Any, world: int = 0, name: str = "mesh",
+        container: bool = False, moving: bool = False,
     ) -> Shape:  # fmt: skip
         """Triangles (t, 3) int between points (p, 3) [length], counterclockwise from outside."""
         return cls(world, name, "mesh", (points, triangles), container, moving=moving)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import shutil
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
-from typing import IO, Any, Self
+from typing import IO, Any
 
 import numpy as np
 
+from ...output import files
 from .image import pillow
 
 FORMATS = (".gif", ".mp4")
@@ -20,16 +20,16 @@ SHORTEST = 2  # hundredths of a second that browsers show a GIF's frame at least
 
 
 class Film:
-    """A file of pictures one after the other. Leaving its ``with`` by an error leaves no file.
+    """A file of pictures one after the other.
 
     Args:
         path: Where to.
+        temporary: What to write until it is complete.
         fps: Pictures a second.
     """
 
-    def __init__(self, path: Path, fps: float):
-        self.path, self.fps = path, fps
-        self.temporary = path.with_name(f".{path.stem}.tmp{path.suffix}")
+    def __init__(self, path: Path, temporary: Path, fps: float):
+        self.path, self.temporary, self.fps = path, temporary, fps
 
     def add(self, array: np.ndarray) -> None:
         """Add a picture, (height, width, 3) uint8."""
@@ -42,29 +42,12 @@ class Film:
     def abandon(self) -> None:
         """Let go of what is under way."""
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        try:
-            if error is None:
-                self.finish()
-                os.replace(self.temporary, self.path)
-        finally:
-            self.abandon()
-            self.temporary.unlink(missing_ok=True)
-
 
 class Gif(Film):
     """A GIF that repeats; the pictures wait in memory, a byte a pixel."""
 
-    def __init__(self, path: Path, fps: float):
-        super().__init__(path, fps)
+    def __init__(self, path: Path, temporary: Path, fps: float):
+        super().__init__(path, temporary, fps)
         self.module = pillow()
         self.pictures: list[Any] = []
 
@@ -85,8 +68,8 @@ class Gif(Film):
 class Mp4(Film):
     """H.264, written while pictures come."""
 
-    def __init__(self, path: Path, fps: float):
-        super().__init__(path, fps)
+    def __init__(self, path: Path, temporary: Path, fps: float):
+        super().__init__(path, temporary, fps)
         self.program = ffmpeg()
         self.process: subprocess.Popen[bytes] | None = None
 
@@ -155,6 +138,13 @@ def ffmpeg() -> str:
     return imageio_ffmpeg.get_ffmpeg_exe()
 
 
-def open_film(path: Path, fps: float) -> Film:
-    """A film of the kind that the path's suffix says."""
-    return (Gif if path.suffix.lower() == ".gif" else Mp4)(path, fps)
+@contextlib.contextmanager
+def open_film(path: Path, fps: float) -> Iterator[Film]:
+    """A film of the kind that the path's suffix says; an error leaves no file."""
+    with files.whole("Film", path) as temporary:
+        film = (Gif if path.suffix.lower() == ".gif" else Mp4)(path, temporary, fps)
+        try:
+            yield film
+            film.finish()
+        finally:
+            film.abandon()
