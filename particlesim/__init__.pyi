@@ -11,6 +11,7 @@ from .constraints.constraint import Constraint
 from .constraints.contact import Contact
 from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
+from .engine.execution.launch import launch
 from .engine.integrators import Integrator
 from .instruments.ledger.ledger import Ledger
 from .instruments.stability import Stability, StabilityWarning
@@ -31,18 +32,63 @@ from .pictures.render.camera import Camera
 from .scene import __version__, sample
 from .scene.group import Group
 from .scene.law import Law, law
-from .scene.part import Interaction
+from .scene.part import ConstraintBase, Interaction
 from .scene.scene import Scene
 from .scene.settings import Settings
 from .simulation.simulation import Simulation
 
 __all__ = [
-    "SPH", "ArtificialViscosity", "Boundary", "BoxBoundary", "Camera", "ConstantForce",
-    "Constraint", "ConstraintForce", "Contact", "Distance", "Drag", "EquationOfState", "Gravity",
-    "Group", "History", "Incident", "Integrator", "Interaction", "Law", "Ledger", "LennardJones",
-    "PairForce", "PairPotential", "PairSum", "ParticleForce", "PlaneBoundary", "Polytrope",
-    "Scene", "Settings", "Simulation", "SimulationError", "SimulationWarning", "SphereBoundary",
-    "Springs", "Stability", "StabilityWarning", "Stress", "Surface", "Tait", "Tradeoff", "Tuned",
-    "UniformGravity", "UsdRecorder", "Viscosity", "__version__", "law", "read_history", "sample",
-    "stress", "tradeoff", "tune"
+    "SPH",
+    "ArtificialViscosity",
+    "Boundary",
+    "BoxBoundary",
+    "Camera",
+    "ConstantForce",
+    "Constraint",
+    "ConstraintBase",
+    "ConstraintForce",
+    "Contact",
+    "Distance",
+    "Drag",
+    "EquationOfState",
+    "Gravity",
+    "Group",
+    "History",
+    "Incident",
+    "Integrator",
+    "Interaction",
+    "Law",
+    "Ledger",
+    "LennardJones",
+    "PairForce",
+    "PairPotential",
+    "PairSum",
+    "ParticleForce",
+    "PlaneBoundary",
+    "Polytrope",
+    "Scene",
+    "Settings",
+    "Simulation",
+    "SimulationError",
+    "SimulationWarning",
+    "SphereBoundary",
+    "Springs",
+    "Stability",
+    "StabilityWarning",
+    "Stress",
+    "Surface",
+    "Tait",
+    "Tradeoff",
+    "Tuned",
+    "UniformGravity",
+    "UsdRecorder",
+    "Viscosity",
+    "__version__",
+    "launch",
+    "law",
+    "read_history",
+    "sample",
+    "stress",
+    "tradeoff",
+    "tune"
 ]  # fmt: skip

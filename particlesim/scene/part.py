@@ -98,7 +98,12 @@ class Part:
 class Interaction(Part):
     """A force: subclasses say what they need and do one thing.
 
-    ``cutoff`` is the distance within which neighbours are looked for, or None.
+    In ``prepare`` it asks for what it looks at, ``neighbors.of(self)`` or a ``PairSum``; in
+    ``apply`` it adds to ``state.force`` and launches only (:func:`particlesim.launch`).
+    ``state`` is the present one; ``neighbors`` holds the pair lists, up to date for it.
+    ``parameters``, where there are any, is a dict of numbers and 3-vectors that may differ from
+    world to world. ``cutoff`` is the distance within which neighbours are looked for; None: all
+    pairs of a world.
     """
 
     requires: frozenset[str] = frozenset({"force"})
