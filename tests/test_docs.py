@@ -91,6 +91,19 @@ def test_the_constraint_of_the_readme(tmp_path, device):
     assert np.dot(np.cross(b - a, c - a), d - a) / 6 == pytest.approx(0.25, rel=1e-3)
 
 
+def test_the_boundary_of_the_readme(tmp_path, device):
+    torus = readme_law("torus", tmp_path)
+    scene = ps.Scene()
+    scene.add_particles([(1.05, 0.4, 0)], radius=0.05)  # above the tube, where it is not steep
+    scene.add_interaction(ps.UniformGravity((0, -10, 0)))
+    scene.add_constraint(ps.Boundary(torus, friction=0.3, ring=1.0, tube=0.2))
+    sim = ps.Simulation(scene, ps.Settings(precision="float64"), device=device)
+    sim.run(60)
+    x, y, z = sim.position[0]
+    # At rest on the tube, its radius away, up to the way g dt^2 of a substep.
+    assert np.hypot(np.hypot(x, z) - 1.0, y) == pytest.approx(0.25, abs=10 / 600**2)
+
+
 @pytest.mark.parametrize("mark", ["run command", "test command"])
 def test_the_readme_has_its_commands(mark):
     command = re.search(rf"<!-- {mark} -->\n```\w*\n(.*?)\n```", README)
