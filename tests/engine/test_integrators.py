@@ -89,7 +89,7 @@ def test_one_of_ones_own_in_checkpoints_and_reports(tmp_path, device):
     again = ps.Simulation.load(tmp_path / "a.npz", scene, settings, device=device)
     again.run(2)
     np.testing.assert_array_equal(again.position, sim.position)
-    with pytest.raises(ValueError, match="integrator must be the PositionVerlet of 'a.npz'"):
+    with pytest.raises(ValueError, match="integrator must be the PositionVerlet of"):
         ps.Simulation.load(tmp_path / "a.npz", scene, device=device)
     with pytest.raises(TypeError, match="subclass of Integrator"):
         ps.Simulation(scene, ps.Settings(integrator=int), device=device)
