@@ -34,6 +34,8 @@ def number(
     """``value`` as a finite float within bounds."""
     suffix = f" [{unit}]" if unit else ""
     try:
+        if isinstance(value, str | bytes):  # which float() would read
+            raise TypeError
         result = float(value)
     except (TypeError, ValueError):
         raise fail(owner, argument, f"be a number{suffix}", value, "give one number") from None
@@ -68,7 +70,11 @@ def vector(owner: str, argument: str, value: Any, *, unit: str = "") -> np.ndarr
 
 
 def rows(owner: str, argument: str, value: Any, count: int | None, width: int | None) -> np.ndarray:
-    """``value`` as a finite (count, width) or, for width None, (count,) array; broadcast to it."""
+    """``value`` as a finite (count, width) or, for width None, (count,) array.
+
+    One value stands for all: a number, or (width,) of a vector; 0 is a vector of zeros. Nothing
+    else is broadcast: a list of one is one row, whatever the count.
+    """
     result = _array(owner, argument, value).copy()
     if count is None:
         if result.ndim != 2 or result.shape[1] != width:
@@ -79,16 +85,16 @@ def rows(owner: str, argument: str, value: Any, count: int | None, width: int | 
             )
     else:
         shape: tuple[int, ...] = (count,) if width is None else (count, width)
-        try:
-            result = np.broadcast_to(result, shape).copy()
-        except ValueError:
+        zero = result.ndim == 0 and not result.any()
+        if result.shape not in (shape, shape[1:]) and not zero:
             raise fail(
                 owner,
                 argument,
                 f"have shape {shape[1:] or '()'} or {shape}",
-                np.shape(value),
+                np.shape(value) if np.ndim(value) else value,
                 "give one value for all, or one a particle",
-            ) from None
+            )
+        result = np.broadcast_to(result, shape).copy()
     _finite(owner, argument, result)
     return result
 
@@ -126,7 +132,10 @@ def _array(owner: str, argument: str, value: Any) -> np.ndarray:
     if hasattr(value, "numpy"):
         value = value.numpy()
     try:
-        return np.asarray(value, dtype=np.float64)
+        given = np.asarray(value)
+        if given.dtype.kind in "US":  # which NumPy would read as numbers
+            raise TypeError
+        return given.astype(np.float64)
     except (TypeError, ValueError):
         raise fail(owner, argument, "be numbers", value, "give an array of floats") from None
 

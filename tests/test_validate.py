@@ -7,7 +7,7 @@ import warp as wp
 from particlesim import validate
 
 
-@pytest.mark.parametrize("value", [3, 3.0, np.float32(3), np.array(3.0), "3"])
+@pytest.mark.parametrize("value", [3, 3.0, np.float32(3), np.array(3.0)])
 def test_numbers_in_whatever_guise(value):
     assert validate.number("Owner", "argument", value, above=0) == 3.0
 

@@ -40,6 +40,8 @@ class Loop:
         self.settings = settings
         self.model = model = Model(scenes, settings, device)
         self.frame = 0
+        self._distinct = list({id(scene): scene for scene in scenes}.values())
+        self._changes = self._counted()
         # What is prepared allocates only what it requires.
         self.interactions: Sequence[Interaction] = _bound([each.interactions for each in scenes])
         self.constraints: Sequence[ConstraintBase] = _bound([each.constraints for each in scenes])
@@ -128,6 +130,15 @@ class Loop:
         # Without a time scale compliance is nothing: alpha / dt^2 = 0.
         self.constrain(math.inf, iterations)
         self.neighbors.grow()
+
+    @property
+    def outdated(self) -> bool:
+        """Whether something was added to a scene since, which is not in motion; told once."""
+        before, self._changes = self._changes, self._counted()
+        return self._changes != before
+
+    def _counted(self) -> int:
+        return sum(scene.changes for scene in self._distinct)
 
     @property
     def parts(self) -> list[Interaction | ConstraintBase]:

@@ -57,12 +57,17 @@ class State:
                     model.world_count, dtype=wp.float64, device=model.device
                 )
             else:
-                dtype = self.dtype(name)
-                start = self.start(name)
-                if start is None:
-                    self.arrays[name] = wp.zeros(self.count, dtype=dtype, device=model.device)
-                else:
-                    self.arrays[name] = model.array(start.astype(model.precision.numpy), dtype)
+                self.arrays[name] = self._new(name)
+
+    def held(self, name: str) -> wp.array:
+        """The array of that name; of one that the scene does not require, its start values."""
+        return self.arrays[name] if name in self.arrays else self._new(name)
+
+    def _new(self, name: str) -> wp.array:
+        model, dtype, start = self._model, self.dtype(name), self.start(name)
+        if start is None:
+            return wp.zeros(self.count, dtype=dtype, device=model.device)
+        return model.array(start.astype(model.precision.numpy), dtype)
 
     def start(self, name: str) -> np.ndarray | None:
         """Start values of an array on the host; None: zeros."""

@@ -36,7 +36,20 @@ def tuples(owner: str, argument: str, value: Any, arity: int | None) -> np.ndarr
             owner, f"{argument}[{at}]", "name different particles", index[at].tolist(),
             "leave the row out",
         )  # fmt: skip
+    _check_once(owner, argument, ordered if index.shape[1] == 2 else index)
     return index.astype(np.int64)
+
+
+def _check_once(owner: str, argument: str, index: np.ndarray) -> None:
+    """Refuse rows that are there twice, as the edges of triangles are: they would count twice."""
+    once, first, count = np.unique(index, axis=0, return_index=True, return_counts=True)
+    if len(once) < len(index):
+        twice = int(np.argmax(count > 1))
+        raise validate.fail(
+            owner, argument, f"hold each of its {len(once)} different rows once",
+            f"{once[twice].tolist()} {count[twice]} times, first in row {first[twice]}",
+            "take np.unique of the sorted rows, or add a second part for what is there twice",
+        )  # fmt: skip
 
 
 def merged(owner: str, argument: str, model: Model, each: Sequence[np.ndarray]) -> np.ndarray:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,24 +40,24 @@ class Diagnostics:
 
 
 def measure(sim: Source, potentials: list[np.ndarray] | None = None) -> Diagnostics:
-    """The diagnostics of the present state.
+    """The diagnostics of the present state, which stays as it is.
 
     Args:
         sim: The simulation.
         potentials: If given, gets the potential energy of each interaction, (worlds,).
     """
     model, state, device = sim.model, sim.state, sim.model.device
-    state.require({"mass", "inverse_mass"})
     energy = wp.zeros(model.particle_count, dtype=wp.float64, device=device)
     virial = wp.zeros_like(energy)
-    sim.neighbors.update(state)
-    sim.neighbors.grow()
-    for interaction in sim.interactions:
-        before = energy.numpy().copy() if potentials is not None else None
-        interaction.measure(state, energy, virial)
-        if potentials is not None:
-            own = energy.numpy() - before
-            potentials.append(np.bincount(model.world_of, own, model.world_count))
+    with undisturbed(sim):
+        sim.neighbors.update(state)
+        sim.neighbors.grow()
+        for interaction in sim.interactions:
+            before = energy.numpy().copy() if potentials is not None else None
+            interaction.measure(state, energy, virial)
+            if potentials is not None:
+                own = energy.numpy() - before
+                potentials.append(np.bincount(model.world_of, own, model.world_count))
     begin, end, world = blocks(model.offsets)
     sums = wp.zeros((len(begin), QUANTITIES), dtype=wp.float64, device=device)
     launch(
@@ -63,7 +65,7 @@ def measure(sim: Source, potentials: list[np.ndarray] | None = None) -> Diagnost
         len(begin),
         [
             model.array(begin, wp.int32), model.array(end, wp.int32), state.position,
-            state.velocity, state.mass, state.inverse_mass, energy, virial, sums,
+            state.velocity, state.held("mass"), state.held("inverse_mass"), energy, virial, sums,
         ],
         device,
     )  # fmt: skip
@@ -72,6 +74,26 @@ def measure(sim: Source, potentials: list[np.ndarray] | None = None) -> Diagnost
     return Diagnostics(
         total[:, 0], total[:, 1:4], total[:, 4:7], total[:, 7], total[:, 8], total[:, 9]
     )
+
+
+@contextlib.contextmanager
+def undisturbed(sim: Source) -> Iterator[None]:
+    """Put back what measuring renews: neighbour rows, whose order decides about rounding, and
+    densities, which belong to the last forces.
+    """
+    state = sim.state
+    kept = {name: wp.clone(state[name]) for name in ("density", "pressure") if name in state}
+    rows = [(each, wp.clone(each.x_listed)) for each in sim.neighbors.verlet]
+    try:
+        yield
+    finally:
+        for name, array in kept.items():
+            wp.copy(state[name], array)
+        for each, listed in rows:
+            if not np.array_equal(each.x_listed.numpy(), listed.numpy()):
+                wp.copy(each.x_listed, listed)
+                each.mark_all()
+                each.rebuild()
 
 
 def blocks(offsets: np.ndarray, size: int = BLOCK) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

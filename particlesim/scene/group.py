@@ -61,20 +61,38 @@ class Group:
 
 
 def select(scene: Any, group: Any, owner: str) -> np.ndarray:
-    """Sorted indices that ``group`` stands for: None (all), a Group, several, or indices."""
+    """Sorted indices that ``group`` stands for.
+
+    Args:
+        scene: Whose particles.
+        group: None (all), a Group or its name, several of these, indices, or (n,) bool.
+        owner: For errors.
+    """
     if group is None:
         return np.arange(scene.particle_count)
+    if isinstance(group, str):
+        names = [each.name for each in scene.groups]
+        return scene[validate.choice(owner, "group", group, names)].indices
     if isinstance(group, Group):
         if group.scene is not scene:
             raise validate.fail(owner, "group", "belong to the scene", group, "use its own group")
         return group.indices
-    if isinstance(group, list | tuple) and group and all(isinstance(g, Group) for g in group):
+    if isinstance(group, list | tuple) and group and all(isinstance(g, Group | str) for g in group):
         return np.unique(np.concatenate([select(scene, g, owner) for g in group]))
     index = np.asarray(group)
     if index.size == 0:
         return np.zeros(0, dtype=np.int64)
+    if index.dtype == bool:
+        if index.shape != (scene.particle_count,):
+            raise validate.fail(
+                owner, "group", f"have shape ({scene.particle_count},) where it is True and False",
+                index.shape, "give one for each particle of the scene",
+            )  # fmt: skip
+        return np.nonzero(index)[0]
     if index.ndim != 1 or not np.issubdtype(index.dtype, np.integer):
-        raise validate.fail(owner, "group", "be groups or indices", group, "pass a Group")
+        raise validate.fail(
+            owner, "group", "be groups, their names or indices", group, "pass a Group"
+        )
     if index.min() < 0 or index.max() >= scene.particle_count:
         worst = index.max() if index.max() >= scene.particle_count else index.min()
         raise validate.fail(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,6 +18,9 @@ RESERVED = frozenset(
     "position velocity mass inverse_mass radius force world density pressure correction image "
     "previous_position position_error velocity_error time dt x".split()
 )
+# What else add_particles takes, and how alike a name may be to these.
+ARGUMENTS = ("velocity", "mass", "radius", "group", "pinned", "color", "triangles", "position")
+CLOSE = 0.72
 
 
 class Scene:
@@ -56,6 +60,7 @@ class Scene:
         self._columns: dict[str, list[np.ndarray]] = {}
         self._widths: dict[str, int | None] = {}
         self.particle_count = 0
+        self.changes = 0  # how often something was added
 
     def add_particles(
         self,
@@ -83,8 +88,8 @@ class Scene:
             color: (r, g, b) in 0..1, for exports.
             triangles: (t, 3) int into these particles, counterclockwise from outside: exports draw
                 the group as this surface.
-            **attributes: Further per-particle values, (n,) or (n, 3), that laws may name
-                (``charge=...``). Groups added without one have zeros.
+            **attributes: Further per-particle values that laws may name (``charge=...``): one
+                number for all, (n,) or (n, 3). Groups added without one have zeros.
 
         Raises:
             ValueError: Wrong shapes, values that are not finite, masses or radii out of range,
@@ -130,6 +135,7 @@ class Scene:
             shape = (count,) if width is None else (count, width)
             parts.append(columns.get(key, np.zeros(shape)))
         self.particle_count += count
+        self.changes += 1
 
     def _color(self, owner: str, color: Any) -> Color:
         """The colour given, or the next of the palette."""
@@ -143,13 +149,23 @@ class Scene:
     def _attribute(self, owner: str, key: str, value: Any, count: int) -> np.ndarray:
         if key in RESERVED:
             raise validate.fail(owner, "attribute", "have a name of its own", key, "rename it")
-        vector = np.ndim(value) == 2 or (np.shape(value) == (3,) and count != 3)
-        column = validate.rows(owner, key, value, count, 3 if vector else None)
-        width = self._widths.get(key, 3 if vector else None)
-        if width != (3 if vector else None):
-            kind = "numbers" if width is None else "vectors"
-            raise validate.fail(owner, key, f"be {kind} as before", np.shape(value), "use one kind")
-        return column
+        if key not in self._widths:
+            self._suspect(owner, key)
+            return validate.rows(owner, key, value, count, 3 if np.ndim(value) == 2 else None)
+        width = self._widths[key]
+        if (np.ndim(value) == 2) > (width == 3):
+            raise validate.fail(owner, key, "be numbers as before", np.shape(value), "use one kind")
+        return validate.rows(owner, key, value, count, width)
+
+    def _suspect(self, owner: str, key: str) -> None:
+        """Refuse an attribute whose name is nearly that of an argument, as vel and masses are."""
+        for name in ARGUMENTS:
+            short = len(key) > 1 and name.startswith(key)
+            if short or difflib.get_close_matches(key, [name], cutoff=CLOSE):
+                raise validate.fail(
+                    owner, "attribute", f"have a name unlike its own argument {name}", key,
+                    f"write {name}=..., or choose another name",
+                )  # fmt: skip
 
     def add_interaction(self, interaction: Interaction) -> Interaction:
         """Add a force; it acts at the start of every substep, in the order of adding."""
@@ -160,7 +176,7 @@ class Scene:
                 f"Scene.add_interaction: interaction must be an Interaction, got {interaction!r}; "
                 "wrap a law in PairForce, PairPotential or ParticleForce."
             )
-        self.interactions.append(interaction)
+        self._add(self.interactions, "interaction", interaction)
         return interaction
 
     def add_constraint(self, constraint: ConstraintBase) -> ConstraintBase:
@@ -172,8 +188,17 @@ class Scene:
                 f"Scene.add_constraint: constraint must be a constraint, got {constraint!r}; "
                 "wrap a law in Constraint."
             )
-        self.constraints.append(constraint)
+        self._add(self.constraints, "constraint", constraint)
         return constraint
+
+    def _add(self, parts: list[Any], kind: str, part: Any) -> None:
+        if any(part is each for each in parts):
+            raise validate.fail(
+                f"Scene.add_{kind}", kind, "be new to the scene", f"the same {part.name} again",
+                "make another, or change its strength",
+            )  # fmt: skip
+        parts.append(part)
+        self.changes += 1
 
     def column(self, name: str) -> np.ndarray:
         """A per-particle array of the description, (n,) or (n, 3) float64."""

@@ -89,6 +89,35 @@ class Writer:
         loop.unknown_forces.update(chosen)
 
 
+class Copy(np.ndarray):
+    """What was read, and cannot be written to: that would change nothing in the simulation.
+
+    Arithmetic makes plain arrays of it, also ``+=``, whose result is then assigned. ``copy()``
+    makes one that may be written to.
+    """
+
+    @classmethod
+    def of(cls, values: np.ndarray) -> Copy:
+        """These values, no longer to be written to."""
+        result = values.view(cls)
+        result.flags.writeable = False
+        return result
+
+    def __array_ufunc__(
+        self, ufunc: np.ufunc, method: str, *inputs: Any, out: Any = None, **options: Any
+    ) -> Any:
+        if out is not None:
+            kept = [None if each is self and not self.flags.writeable else each for each in out]
+            if any(each is not None for each in kept):
+                options["out"] = tuple(_plain(each) for each in kept)
+        result = getattr(ufunc, method)(*(_plain(each) for each in inputs), **options)
+        return out[0] if out is not None and "out" in options and len(out) == 1 else result
+
+
+def _plain(value: Any) -> Any:
+    return value.view(np.ndarray) if isinstance(value, Copy) else value
+
+
 class Access:
     """Per-particle arrays by name: a member says which rows."""
 
@@ -102,8 +131,12 @@ class Access:
 
     @property
     def position(self) -> np.ndarray:
-        """Positions, (n, 3), a copy on the host; of all worlds, one after the other."""
-        return self.get("position")
+        """Positions, (n, 3), a copy on the host; of all worlds, one after the other.
+
+        ``sim.position = x`` and ``sim.position += d`` write; ``sim.position[0] = x`` would write
+        into the copy, so that NumPy refuses it.
+        """
+        return Copy.of(self.get("position"))
 
     @position.setter
     def position(self, value: Any) -> None:
@@ -111,8 +144,8 @@ class Access:
 
     @property
     def velocity(self) -> np.ndarray:
-        """Velocities, (n, 3), a copy on the host; of all worlds, one after the other."""
-        return self.get("velocity")
+        """Velocities, (n, 3), a copy on the host, like :attr:`position`."""
+        return Copy.of(self.get("velocity"))
 
     @velocity.setter
     def velocity(self, value: Any) -> None:

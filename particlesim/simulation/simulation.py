@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Self
@@ -14,6 +15,7 @@ from ..engine.loop import Loop
 from ..engine.model import batch
 from ..instruments.ledger.accounts import Accounts
 from ..instruments.stability import automatic, warn_if_past
+from ..instruments.watchdog.incident import SimulationWarning
 from ..instruments.watchdog.watch import Watchdog
 from ..interactions.fusion import fuse
 from ..output import checkpoint
@@ -86,6 +88,13 @@ class Simulation(Reading):
                 to stop, or no retry has helped. The message names the first such particle, its
                 world, the time and what did it. The state is the last good frame's.
         """
+        if self.loop.outdated:
+            warnings.warn(
+                "Simulation: scene must be complete when it is simulated, got particles or parts "
+                "that were added since, which are not in it; make a new Simulation.",
+                SimulationWarning,
+                stacklevel=2,
+            )
         if self.particle_count and self.settings.dt > 0:
             self.loop.know_forces()
             self.frames.run(self.settings.substeps)

@@ -93,7 +93,7 @@ def test_only_attributes_that_a_law_names_are_on_the_device(device):
     def coulomb(r: float, charge_i: float, charge_j: float):
         return charge_i * charge_j / r
 
-    scene = scene_with(ps.PairPotential(coulomb, cutoff=1.5), charge=1.0, spin=(0, 0, 1))
+    scene = scene_with(ps.PairPotential(coulomb, cutoff=1.5), charge=1.0, spin=[(0, 0, 1)] * 8)
     sim, _ = explained(scene, device)
     assert "charge" in sim.state
     assert "spin" not in sim.state

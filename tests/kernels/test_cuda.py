@@ -53,7 +53,7 @@ def flat(a: wp.vec3, b: wp.vec3, c: wp.vec3, area: float):
 def particles(count=600, periodic=None, **attributes):
     scene = ps.Scene(periodic=periodic)
     x = np.random.default_rng(0).uniform(0, 10, (count, 3))
-    scene.add_particles(x, radius=0.1, charge=1.0, spin=(0, 0, 1), **attributes)
+    scene.add_particles(x, radius=0.1, charge=1.0, spin=[(0, 0, 1)] * len(x), **attributes)
     return scene
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
+from particlesim.scene.group import select
 
 
 def test_groups_index_the_scene():
@@ -41,7 +42,7 @@ def test_one_value_for_all_or_one_each():
 def test_attributes_are_zero_where_they_are_not_given():
     scene = ps.Scene()
     scene.add_particles(np.zeros((2, 3)))
-    scene.add_particles(np.zeros((2, 3)), charge=[1, -1], spin=(0, 0, 1))
+    scene.add_particles(np.zeros((2, 3)), charge=[1, -1], spin=[(0, 0, 1)] * 2)
     scene.add_particles(np.zeros((1, 3)), charge=5)
     np.testing.assert_array_equal(scene.column("charge"), [0, 0, 1, -1, 5])
     np.testing.assert_array_equal(scene.column("spin")[:, 2], [0, 0, 1, 1, 0])
@@ -53,6 +54,55 @@ def test_three_numbers_for_three_particles_are_numbers():
     scene = ps.Scene()
     scene.add_particles(np.zeros((3, 3)), charge=[1, 2, 3])
     assert scene.attributes["charge"] is None
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4])
+def test_shapes_mean_the_same_at_every_count(count, refused):
+    """A list of one is one particle's, and three numbers are those of three particles."""
+    x = np.zeros((count, 3))
+    given = {"mass": [2.0], "radius": [0.5], "pinned": [1], "charge": [2.0], "spin": (0, 0, 1)}
+    rows = {"mass": 1, "radius": 1, "pinned": 1, "charge": 1, "spin": 3}
+    for name, value in given.items():
+        scene = ps.Scene()
+        if rows[name] == count:
+            scene.add_particles(x, **{name: value})
+            np.testing.assert_array_equal(scene.column(name), value)
+        else:
+            with refused(f"{name} must have shape"):
+                scene.add_particles(x, **{name: value})
+    with refused("velocity must have shape"):
+        ps.Scene().add_particles(x, velocity=5.0)
+
+
+@pytest.mark.parametrize(
+    "name, real",
+    [("vel", "velocity"), ("velocities", "velocity"), ("masses", "mass"), ("radii", "radius"),
+     ("pined", "pinned"), ("colour", "color"), ("groups", "group"), ("positions", "position")],
+)  # fmt: skip
+def test_a_misspelt_argument_is_no_attribute(name, real, refused):
+    with refused(f"unlike its own argument {real}, got '{name}'; write {real}="):
+        ps.Scene().add_particles([(0, 0, 0)], **{name: 1.0})
+
+
+def test_numbers_as_text_are_refused(refused):
+    with refused("mass must be numbers"):
+        ps.Scene().add_particles([(0, 0, 0)], mass="1")
+    with refused("cutoff must be a number"):
+        ps.LennardJones(cutoff="3")
+
+
+def test_what_stands_for_a_group(refused):
+    """A group, its name, several of both, indices or a mask are the same particles."""
+    scene = ps.Scene()
+    scene.add_particles(np.zeros((2, 3)), group="sand")
+    water = scene.add_particles(np.ones((3, 3)), group="water")
+    for given in (water, "water", [water], ["water"], [2, 3, 4], scene.position[:, 0] > 0):
+        np.testing.assert_array_equal(select(scene, given, "Part"), [2, 3, 4])
+    np.testing.assert_array_equal(select(scene, ["sand", water], "Part"), np.arange(5))
+    with refused("group must be one of sand, water, got 'wader'; did you mean 'water'"):
+        select(scene, "wader", "Part")
+    with refused(r"group must have shape \(5,\) where it is True and False"):
+        select(scene, [True, False], "Part")
 
 
 def test_what_was_given_may_change_afterwards():

@@ -132,3 +132,13 @@ def test_one_substep(device):
     sim = ps.Simulation(scene, ps.Settings(dt=0.5, substeps=1), device=device)
     sim.step()
     np.testing.assert_array_equal(sim.position[:, 0], scene.position[:, 0] + 0.5)
+
+
+def test_what_is_added_afterwards_is_told_once(device):
+    scene = drifting()
+    sim = ps.Simulation(scene, device=device)
+    sim.step()
+    scene.add_interaction(ps.UniformGravity())
+    with pytest.warns(ps.SimulationWarning, match="make a new Simulation") as told:
+        sim.run(3)
+    assert len(told) == 1

@@ -58,9 +58,23 @@ def spread(r: float, reach: float):
 
 def test_what_is_read_is_a_copy(device):
     sim = ps.Simulation(drifting(), device=device)
-    x = sim.position
+    x = sim.get("position")
     x[:] = 0
     assert sim.position[-1, 2] == 8
+
+
+def test_a_copy_cannot_be_written_to_by_mistake(device):
+    """What would change nothing is refused; arithmetic and assignments are as ever."""
+    sim = ps.Simulation(drifting(), device=device)
+    for target in (sim.position, sim.velocity, sim.world(0).position, sim.world(0).velocity):
+        with pytest.raises(ValueError, match="read-only"):
+            target[0] = (5, 5, 5)
+    before = sim.position.copy()
+    sim.position += 1
+    sim.world(0).position -= 2
+    np.testing.assert_array_equal(sim.position, before - 1)
+    before[0] = 3  # a copy of the copy is one's own
+    assert type(sim.position + 1) is np.ndarray
 
 
 def test_writing(precision, device):

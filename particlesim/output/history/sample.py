@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-import warp as wp
 
 from ...engine.loop import Source
-from ...instruments.diagnostics import measure
+from ...instruments.diagnostics import measure, undisturbed
 from ...instruments.residuals import residuals
 from ...interactions.fluid.sph import SPH
 
 
 def sample(sim: Source) -> dict[str, np.ndarray]:
     """One row of a history: name to (worlds,), float64."""
-    with _undisturbed(sim):
+    with undisturbed(sim):
         potentials: list[np.ndarray] = []
         total = measure(sim, potentials)
         values = {"mass": total.mass}
@@ -56,6 +54,7 @@ def _labels(parts: Iterable[Any]) -> list[str]:
 
 def _density_error(fluid: SPH, sim: Source) -> tuple[np.ndarray, np.ndarray]:
     """rho / rho0 - 1 of the fluid's particles, and their worlds."""
+    fluid.update_density()
     members = fluid.pairs.members_host
     world = sim.model.world_of[members]
     rest = np.array([peer.parameters["rest_density"] for peer in fluid.peers])
@@ -75,23 +74,3 @@ def _figures(
         f"{name}_max:{label}": np.where(count > 0, largest, 0.0),
         f"{name}_rms:{label}": np.sqrt(square),
     }
-
-
-@contextlib.contextmanager
-def _undisturbed(sim: Source) -> Iterator[None]:
-    """Put back what measuring renews: neighbour rows, whose order decides about rounding, and
-    densities, which belong to the last forces.
-    """
-    state = sim.state
-    kept = {name: wp.clone(state[name]) for name in ("density", "pressure") if name in state}
-    rows = [(each, wp.clone(each.x_listed)) for each in sim.neighbors.verlet]
-    try:
-        yield
-    finally:
-        for name, array in kept.items():
-            wp.copy(state[name], array)
-        for each, listed in rows:
-            if not np.array_equal(each.x_listed.numpy(), listed.numpy()):
-                wp.copy(each.x_listed, listed)
-                each.mark_all()
-                each.rebuild()

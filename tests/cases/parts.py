@@ -1,0 +1,181 @@
+"""Every ready interaction, constraint and boundary in a scene of its own, in any frame.
+
+Parts are found among the public names, and their arguments by name in ``QUANTITIES``; so a part
+that is added later is tested like the others, once each of its arguments has a meaning here.
+"""
+
+import functools
+import inspect
+
+import numpy as np
+import warp as wp
+
+import particlesim as ps
+from cases.frames import Frame, Quantity
+from particlesim.scene.part import ConstraintBase, Interaction
+
+FORCE, STIFFNESS = (1, 1, -2), (0, 1, -2)
+COUNT = 8
+PAIRS = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (6, 7)]
+
+
+@ps.law
+def screened(r: float, strength: float, reach: float):
+    return strength * wp.exp(-r / reach) / r
+
+
+@ps.law
+def repulsion(r: float, stiffness: float, reach: float):
+    return stiffness * wp.max(reach - r, 0.0)
+
+
+@ps.law
+def trap(position: wp.vec3, velocity: wp.vec3, stiffness: float, middle: wp.vec3):
+    return -stiffness * (position - middle)
+
+
+@ps.law
+def separation(a: wp.vec3, b: wp.vec3, rest_length: float):
+    return wp.length(b - a) - rest_length
+
+
+@ps.law
+def bowl(x: wp.vec3, middle: wp.vec3, size: float):
+    return size - wp.length(x - middle)
+
+
+# What arguments mean, by name; where classes differ, by class and name.
+QUANTITIES = {
+    "epsilon": Quantity(0.8, (2, 1, -2)),
+    "sigma": Quantity(0.9, (1, 0, 0)),
+    "cutoff": Quantity(2.1, (1, 0, 0)),
+    "G": Quantity(0.7, (3, -1, -2)),
+    "softening": Quantity(0.3, (1, 0, 0)),
+    "stiffness": Quantity(6.0, STIFFNESS),
+    "rest_length": Quantity(1.1, (1, 0, 0)),
+    "damping": Quantity(0.4, (0, 1, -1)),
+    "acceleration": Quantity((0.3, -1.0, 0.2), (1, 0, -2), "vector"),
+    "force": Quantity((0.3, -1.0, 0.2), FORCE, "vector"),
+    "linear": Quantity(0.3, (0, 1, -1)),
+    "quadratic": Quantity(0.2, (-1, 1, 0)),
+    "flow": Quantity((0.5, 0.1, -0.2), (1, 0, -1), "velocity"),
+    "compliance": Quantity(0.05, (0, -1, 2)),
+    "friction": Quantity(0.3),
+    "restitution": Quantity(0.5),
+    "point": Quantity((0, -1.2, 0), (1, 0, 0), "point"),
+    "normal": Quantity((0.1, 1, 0.2), kind="vector"),
+    "center": Quantity((0.1, 0, 0), (1, 0, 0), "point"),
+    "lower": Quantity((-1.5, -1.4, -1.6), (1, 0, 0), "corner"),
+    "upper": Quantity((1.5, 1.6, 1.4), (1, 0, 0), "corner"),
+    "velocity": Quantity((0.1, 0.2, 0.1), (1, 0, -1), "velocity"),
+    "angular_velocity": Quantity((0.0, 0.0, 0.0), (0, 0, -1), "axial"),
+    "smoothing_length": Quantity(0.9, (1, 0, 0)),
+    "rest_density": Quantity(1.0, (-3, 1, 0)),
+    "strength": Quantity(0.8, (3, 1, -2)),
+    "reach": Quantity(1.4, (1, 0, 0)),
+    "middle": Quantity((0.1, 0.2, -0.1), (1, 0, 0), "point"),
+    "size": Quantity(1.9, (1, 0, 0)),
+    ("SphereBoundary", "radius"): Quantity(1.9, (1, 0, 0)),
+    ("Distance", "damping"): Quantity(0.5, (0, 1, -1)),
+}
+# What laws are given to the parts that take one, with the parameters that come with it.
+LAWS = {
+    "PairPotential": (screened, ("strength", "reach")),
+    "PairForce": (repulsion, ("stiffness", "reach")),
+    "ParticleForce": (trap, ("stiffness", "middle")),
+    "Constraint": (separation, ("rest_length",)),
+    "Boundary": (bowl, ("middle", "size")),
+}
+PLAIN = {"pairs": PAIRS, "particles": PAIRS, "group": None, "exponents": (12, 6)}
+LEFT_OUT = {"break_force", "inequality", "tension_only", "truncation", "inside", "potential",
+            "smoothing", "dimension", "viscosity", "pivot", "drawn"}  # fmt: skip
+
+
+def fluid_parts(frame):
+    """The parts of a fluid, which are objects of their own."""
+    speed = frame.of(Quantity(3.0, (1, 0, -1)))
+    return {
+        "equation_of_state": ps.Tait(sound_speed=speed),
+        "viscosity": ps.ArtificialViscosity(0.2),
+    }
+
+
+@functools.cache
+def kinds():
+    """Public classes that can be added to a scene, by name."""
+    found = {}
+    for name in ps.__all__:
+        kind = getattr(ps, name)
+        if isinstance(kind, type) and issubclass(kind, Interaction | ConstraintBase):
+            abstract = kind in (Interaction, ConstraintBase)
+            if not abstract:
+                found[name] = kind
+    return found
+
+
+def arguments(name, frame):
+    """What a part is made with, as an observer of that frame gives it."""
+    if name == "ConstraintForce":
+        return {"constraint": make("Constraint", frame)}
+    given = {}
+    extra = ()
+    for key, parameter in inspect.signature(kinds()[name]).parameters.items():
+        if key == "law":
+            given["law"], extra = LAWS[name]
+        elif key in PLAIN:
+            given[key] = PLAIN[key]
+        elif key in fluid_parts(frame):
+            given[key] = fluid_parts(frame)[key]
+        elif key not in LEFT_OUT and parameter.kind is not parameter.VAR_KEYWORD:
+            given[key] = frame.of(quantity(name, key))
+    if "lower" in given:  # corners are turned, and the box is then named by its new ones
+        corners = given["lower"], given["upper"]
+        given["lower"], given["upper"] = np.minimum(*corners), np.maximum(*corners)
+    return given | {key: frame.of(quantity(name, key)) for key in extra}
+
+
+def quantity(name, key):
+    """The meaning of an argument."""
+    found = QUANTITIES.get((name, key), QUANTITIES.get(key))
+    assert found is not None, f"{name}: tests/cases/parts.py must say what {key} means"
+    return found
+
+
+def make(name, frame):
+    """A part by its name."""
+    return kinds()[name](**arguments(name, frame))
+
+
+def along_axes(name):
+    """Whether a part knows the axes, so that only quarter turns leave it what it is."""
+    return any(
+        quantity(name, key).kind == "corner"
+        for key in inspect.signature(kinds()[name]).parameters
+        if key in QUANTITIES
+    )
+
+
+def particles():
+    """Positions, velocities, masses and radii of a loose cluster, in plain numbers."""
+    rng = np.random.default_rng(4)
+    corners = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)], dtype=float)
+    x = 1.2 * (corners - 0.5) + rng.uniform(-0.1, 0.1, (COUNT, 3))
+    v = rng.normal(0, 0.3, (COUNT, 3))
+    return x, v, rng.uniform(0.5, 1.5, COUNT), rng.uniform(0.4, 0.6, COUNT)
+
+
+def scene(names, frame=None, order=None, changed=None):
+    """A scene of the cluster and these parts, in a frame; ``order`` permutes the particles."""
+    frame = Frame() if frame is None else frame
+    order = np.arange(COUNT) if order is None else order
+    x, v, m, radius = particles()
+    result = ps.Scene()
+    result.add_particles(
+        frame.point(x)[order], velocity=frame.velocity(v)[order],
+        mass=m[order] * frame.mass, radius=radius[order] * frame.length,
+    )  # fmt: skip
+    for name in names:
+        part = make(name, frame) if changed is None else changed(name, frame)
+        is_force = isinstance(part, Interaction)
+        (result.add_interaction if is_force else result.add_constraint)(part)
+    return result
