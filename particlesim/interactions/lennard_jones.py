@@ -116,10 +116,14 @@ class LennardJones(Pair):
         return self.epsilon > 0
 
     def tail(self, density: float) -> tuple[float, float]:
-        """Energy and virial that the cutoff leaves out of each particle, for g(r) = 1 beyond it.
+        """Energy and virial that the truncation leaves out of each particle, for g(r) = 1.
 
-        U/N = 2 pi rho int u r^2 dr and W/N = -2 pi rho int u' r^3 dr, from the cutoff to
-        infinity (Allen and Tildesley 1987, eq. 2.144); n > m > 3.
+        From the cutoff to infinity U/N = 2 pi rho int u r^2 dr and W/N = -2 pi rho int u' r^3 dr
+        (Allen and Tildesley 1987, eq. 2.144); n > m > 3. Within it, what a shift has taken from
+        every pair, int u(r_c) r^2 dr, and of the force too where that is shifted.
+
+        Args:
+            density: Particles a volume [1/length^3].
         """
         (n, m), s, cut = self.exponents, self.sigma, self.parameters["cut"]
         if m <= 3:
@@ -127,4 +131,8 @@ class LennardJones(Pair):
         scale = 2.0 * np.pi * density * self.parameters["strength"]
         a = s**n * cut ** (3 - n) / (n - 3)
         b = s**m * cut ** (3 - m) / (m - 3)
-        return float(scale * (a - b)), float(scale * (n * a - m * b))
+        u_cut, f_cut = self.parameters["u_cut"], self.parameters["f_cut"]
+        within = 2.0 * np.pi * density * cut**3
+        energy = within * (u_cut / 3.0 + f_cut * cut / 12.0)
+        virial = within * f_cut * cut / 4.0
+        return float(scale * (a - b) + energy), float(scale * (n * a - m * b) + virial)
