@@ -51,6 +51,16 @@ def measure_term(
     return _term("pair_measure", evaluate, result, names_of, precision, data, params)
 
 
+def virial_term(
+    force: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any
+) -> wp.Function:
+    """Term (0, r F / 2) of a force that is no derivative of an energy."""
+    evaluate = f"    f = law({', '.join(['r', *arguments])})"
+    names_of = {"law": force, "pair2": precision.vector(2)}
+    result = "pair2(real(0.0), real(0.5) * r * f)"
+    return _term("pair_virial", evaluate, result, names_of, precision, data, params)
+
+
 def sum_term(
     law: wp.Function, arguments: list[str], width: int, fields: Mapping[str, Any],
     precision: Precision, data: Any, params: Any,

@@ -124,9 +124,9 @@ class Pair(Interaction):
         return probe.response(self) + ([] if self.cutoff is None else collisions(self, probe))
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
-        if self.potential is not None:
-            term = self._term(kernels.measure_term, 0)
-            self.loop.sum(term, kernels.store_measure, {"energy": energy, "virial": virial}, 2)
+        make = kernels.virial_term if self.potential is None else kernels.measure_term
+        out = {"energy": energy, "virial": virial}
+        self.loop.sum(self._term(make, 0), kernels.store_measure, out, 2)
 
 
 class PairPotential(Pair):

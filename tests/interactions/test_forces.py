@@ -190,3 +190,20 @@ def test_momentum_of_an_isolated_scene(name, precision, device, cluster, simulat
     # Central forces keep the angular momentum too, up to the rounding of positions about 5 away.
     drift = np.abs(after.angular_momentum - before.angular_momentum).max()
     assert drift < 5 * 100 * eps * scale
+
+
+@pytest.mark.parametrize("kind", [ps.PairForce, ps.PairPotential])
+def test_virial_is_the_sum_of_r_f(kind, precision, device, cluster):
+    """Of a force alone too: sum over pairs of x_ij . f_ij = sum over particles of x . f."""
+
+    @ps.law
+    def push(r: float):
+        return 1.5 * (1.2 - r)
+
+    scene = cluster(12)
+    scene.add_interaction(kind(push, cutoff=1.2))
+    sim = ps.Simulation(scene, ps.Settings(precision=precision), device=device)
+    sim.forces(0.1)
+    expected = (sim.get("position").astype(float) * sim.get("force").astype(float)).sum()
+    rounding = 100 * np.finfo(precision).eps * np.abs(sim.get("force")).max() * 12
+    assert abs(sim.diagnostics().virial[0] - expected) < rounding
