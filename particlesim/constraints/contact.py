@@ -90,6 +90,16 @@ class Contact(EasedConstraint):
         # A world of points has no contacts, and no list.
         self.cutoff = 2.0 * np.where(largest > 0, largest, largest.max())
 
+    def complaint(self) -> str:
+        """That nothing can touch, where all are points."""
+        members = self.model.members([peer.group for peer in self.peers], self.name)
+        if self.count or len(members) < 2:
+            return ""
+        return (
+            f"{self.name}: radius must be above 0 for particles to touch, got 0 for all "
+            f"{len(members)}; give add_particles(..., radius=...)."
+        )
+
     def _column(self, name: str) -> np.ndarray:
         return np.array([getattr(peer, name) for peer in self.peers], dtype=float)
 

@@ -137,8 +137,9 @@ def warn_if_past(loop: Loop) -> None:
     if loop in _checked or not loop.settings.dt > 0:
         return
     _checked.add(loop)
-    if said := misfit(loop):
-        warnings.warn(said, StabilityWarning, stacklevel=3)
+    for said in (misfit(loop), *(part.complaint() for part in loop.parts)):
+        if said:
+            warnings.warn(said, StabilityWarning, stacklevel=3)
     if stability(loop, quick=True).safe:
         return
     report = stability(loop)

@@ -73,6 +73,10 @@ class Part:
         """
         return []
 
+    def complaint(self) -> str:
+        """What is to be said of the start, once a run begins; empty where it fits."""
+        return ""
+
     def persistent(self) -> dict[str, Any]:
         """Arrays that outlive a substep, for snapshots and checkpoints."""
         return {}

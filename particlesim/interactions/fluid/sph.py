@@ -30,6 +30,9 @@ VARIABLES = {
     "sound_speed": ("density", "pressure"),
     "term": ("approach", "distance_squared", "density", "sound_speed"),
 }
+# Parts of the rest density between which the median of a start lies that has masses that fit; free
+# surfaces halve it there.
+LEAST_DENSE, MOST_DENSE = 0.4, 1.6
 COINCIDENT = 1e-6  # closer than this, in parts of h, particles count as coincident
 
 
@@ -207,6 +210,26 @@ class SPH(Interaction):
     def limits(self, probe: Probe) -> list[Limit]:
         """By sound with viscosity, and by acceleration."""
         return fluid_limits(self, probe)
+
+    def complaint(self) -> str:
+        """That the masses do not make the rest density, where they are far from it."""
+        rest = np.array([peer.parameters.get("rest_density", 0.0) for peer in self.peers])
+        members = self.pairs.members_host
+        rest = rest[self.model.world_of[members]]
+        if not len(members) or not rest.all():
+            return ""
+        kept = [(each, wp.clone(each)) for each in (self.state.density, self.state.pressure)]
+        self.update_density()
+        share = float(np.median(self.state.density.numpy()[members] / rest))
+        for array, before in kept:
+            wp.copy(array, before)
+        if LEAST_DENSE < share < MOST_DENSE:
+            return ""
+        mass = float(np.median(self.model.column("mass")[members]))
+        return (
+            f"{self.name}: mass must make the rest density at the particles' spacing, got "
+            f"{mass:.4g}, which makes {share:.3g} of it; give about {mass / share:.4g}."
+        )
 
     def sound_speeds(self, probe: Probe) -> np.ndarray:
         """Speed of sound at the present densities, of each member [length/time]."""
