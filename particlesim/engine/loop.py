@@ -167,7 +167,7 @@ class Loop:
 
     def get(self, name: str) -> np.ndarray:
         """A per-particle array, copied to the host."""
-        return self.state[name].numpy().copy()
+        return self.state.held(name).numpy().copy()
 
 
 def _bound(parts: Sequence[Sequence[Any]]) -> list[Any]:

@@ -60,8 +60,14 @@ class State:
                 self.arrays[name] = self._new(name)
 
     def held(self, name: str) -> wp.array:
-        """The array of that name; of one that the scene does not require, its start values."""
-        return self.arrays[name] if name in self.arrays else self._new(name)
+        """The array of that name; of what the scene gives and does not require, its values."""
+        if name not in self.arrays and self.is_given(name):
+            return self._new(name)
+        return self[name]
+
+    def is_given(self, name: str) -> bool:
+        """Whether the particles of the scene come with it, as with masses and attributes."""
+        return name in START or name == "inverse_mass" or name in self._model.attributes
 
     def _new(self, name: str) -> wp.array:
         model, dtype, start = self._model, self.dtype(name), self.start(name)

@@ -25,6 +25,8 @@ class Writer:
     def set(self, name: str, value: Any, rows: slice) -> None:
         """Write rows of a per-particle array (see :meth:`Simulation.set`)."""
         owner, model, state = "Simulation.set", self.loop.model, self.loop.state
+        if state.is_given(name):
+            state.require({name})
         array = state[name]
         host = array.numpy().copy()
         shape = host[rows].shape
@@ -173,7 +175,7 @@ class World(Access):
 
     def get(self, name: str) -> np.ndarray:
         """A per-particle array of this world, copied to the host."""
-        array = self._loop.state[name]
+        array = self._loop.state.held(name)
         if self.rows.start == self.rows.stop:  # Warp has no empty slice at an array's end
             return array.numpy()[self.rows].copy()
         return array[self.rows].numpy().copy()

@@ -159,8 +159,8 @@ def test_values_set_in_a_simulation(name, bad, row):
     scene = ps.Scene()
     scene.add_particles(np.eye(7, 3))
     sim = ps.Simulation(scene, device="cpu")
-    value = getattr(sim, name)
-    before = value.copy()
+    before = getattr(sim, name)
+    value = before.copy()
     value[row, row % 3] = bad
     with pytest.raises(ValueError, match=rf"{name}\[{row}"):
         setattr(sim, name, value)

@@ -146,3 +146,20 @@ def test_reset_repeats_the_run(method, liquid, device):
     sim.run(5)
     assert sim.time == t
     np.testing.assert_array_equal(sim.position, first)
+
+
+def test_what_the_scene_gives_can_always_be_read_and_written(device):
+    """Masses, radii and attributes, whether a part asks for them or not."""
+    scene = ps.Scene()
+    scene.add_particles(np.eye(3), mass=[1.0, 2.0, 3.0], radius=0.5, charge=[1.0, 0.0, -1.0])
+    scene.add_interaction(ps.ConstantForce((1, 0, 0)))
+    sim = ps.Simulation(scene, ps.Settings(dt=1.0, substeps=1), device=device)
+    np.testing.assert_array_equal(sim.get("mass"), [1, 2, 3])
+    np.testing.assert_array_equal(sim.get("charge"), [1, 0, -1])
+    assert "mass" not in sim.state  # looking makes no array
+    sim.set("mass", [2.0, 2.0, 2.0])
+    sim.step()
+    np.testing.assert_array_equal(sim.velocity[:, 0], 0.5)
+    assert sim.diagnostics().mass[0] == 6
+    with pytest.raises(ValueError, match="mass must be above 0"):
+        sim.set("mass", 0.0)

@@ -95,7 +95,7 @@ def test_what_is_not_there_any_more_says_what_to_do(refused, gone, simulated, la
 def test_positions_that_cannot_be_drawn(refused, simulated, lattice, mesh_of):
     sim = simulated(lattice(4, 4, 4))
     surface = ps.Surface(sim)
-    x = sim.position
+    x = sim.get("position")
     for bad, words in ((np.nan, "position must be finite.*particle 7 of world 0"),
                        (1e7, "spacing must be at least the fluid's extent over")):  # fmt: skip
         x[7, 1] = bad
