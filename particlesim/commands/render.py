@@ -27,7 +27,6 @@ from .shell import (
     load,
     opened,
     simulation,
-    start_warp,
 )
 
 OWNER = "render"
@@ -93,6 +92,8 @@ def render(
         )  # fmt: skip
         path = Path(file)
         if path.suffix.lower() in USD:
+            from ..engine.start import start_warp
+
             start_warp(debug)
         elif request.is_film:
             raise validate.fail(

@@ -12,6 +12,7 @@ import warp as wp
 from ...engine.execution.executors import available_threads
 from ...engine.execution.launch import Launch
 from ...engine.execution.threads import Chain, Team
+from ...engine.start import start_warp
 from ...kernels.pictures import draw as render_draw
 from ...kernels.pictures import view as render_view
 from ...kernels.pictures.shapes import Shapes
@@ -29,6 +30,7 @@ class Crew:
     """
 
     def __init__(self, device: Any = None, threads: int | None = None):
+        start_warp()
         self.device = wp.get_device(device)
         self.threads = (threads or available_threads()) if self.device.is_cpu else 1
         self._kept: dict[str, wp.array] = {}
