@@ -128,7 +128,8 @@ class Simulation(Reading):
                 (:func:`particlesim.output.recorders.open_recorder`).
             overwrite: Replace an existing output.
             fields: Names of further per-particle arrays to record.
-            progress: True for a bar on the terminal, or a function of (frame, frames).
+            progress: True for a bar on a terminal or in a notebook; or a function of
+                (frame, frames).
             history: Path of a ``.csv`` or ``.jsonl`` file to write energies, momenta and errors of
                 the start and every frame to (see ``ps.History``).
             checkpoint: Frames from one checkpoint to the next; 0: none. None: by the clock, at
