@@ -87,6 +87,17 @@ class Camera:
         framing.add(points, radius)
         return framing.camera()
 
+    def sees(self, points: Any, radius: Any, aspect: float, share: float = 1.0) -> bool:
+        """Whether a share of some spheres, as of :meth:`around`, is within each edge."""
+        if not len(points):
+            return True
+        x = np.asarray(points, dtype=np.float64) - self.position
+        right, up, back = self.axes @ x.T
+        edges = []
+        for along, k in ((right, self.slope * aspect), (up, self.slope)):
+            edges += [side + k * back + radius * math.hypot(1.0, k) for side in (along, -along)]
+        return all(_most(edge, share) <= 0.0 for edge in edges)
+
 
 class Framing:
     """What a camera has to see, which may come in parts: of one frame, or of many.

@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 import particlesim as ps
+from particlesim.output.usd.recording import Recording
 from particlesim.pictures.render.camera import ROOM, Framing
+from particlesim.pictures.render.geometry import Geometry
+from particlesim.pictures.render.overview import overview
+from particlesim.pictures.render.stage import look_at, overlook
 
 ASPECT = 16 / 9
 
@@ -87,3 +91,55 @@ def test_particles_under_a_pixel_are_drawn(supersample):
     for c, r in zip(column, row, strict=True):
         near = drawn[int(r - 0.5) : int(r + 0.5) + 1, int(c - 0.5) : int(c + 0.5) + 1]
         assert near.any()
+
+
+def high_drop(count):
+    """A flat heap of spheres, and one far above."""
+    x = np.random.default_rng(2).uniform(-1, 1, (count, 3)) * (1, 0.1, 1)
+    x[0] = (0, 20, 0)
+    geometry = Geometry()
+    geometry.add_spheres(x, 0.02, (1.0, 0.0, 0.0))
+    return geometry, x
+
+
+def test_one_high_drop_of_many_does_not_rule_the_picture():
+    geometry, x = high_drop(3000)
+    camera = overview(geometry, (0, 1, 0), ASPECT)
+    alone = ps.Camera.around(x[1:], (0, 1, 0), ASPECT, 0.02)
+    # No farther than for all but the drop: 1 % is left out at each edge.
+    assert np.linalg.norm(camera.position - camera.target) < 1.1 * np.linalg.norm(
+        alone.position - alone.target
+    )
+    right, up, back = ((x[1:] - camera.position) @ camera.axes.T).T
+    k = camera.slope
+    out = (np.abs(right) > -back * k * ASPECT) | (np.abs(up) > -back * k)
+    assert out.mean() <= 4 * 0.01
+
+
+def test_all_of_a_small_scene_is_shown():
+    geometry, x = high_drop(1000)
+    assert outside(overview(geometry, (0, 1, 0), ASPECT), x, 0.02) < 1e-6  # in single precision
+
+
+def test_what_spreads_a_little_is_shown_whole():
+    x = np.random.default_rng(3).uniform(-1, 1, (3000, 3))
+    geometry = Geometry()
+    geometry.add_spheres(x, 0.02, (1.0, 0.0, 0.0))
+    assert outside(overview(geometry, (0, 1, 0), ASPECT), x, 0.02) < 1e-6
+
+
+@pytest.mark.parametrize("speed", [0.0, 8.0])
+def test_a_film_sees_all_of_its_frames(tmp_path, speed):
+    scene = ps.Scene()
+    start = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], dtype=float)
+    scene.add_particles(start, velocity=speed * (start - 0.5), radius=0.1)
+    path = tmp_path / "out.usda"
+    sim = ps.Simulation(scene, ps.Settings(dt=0.1), device="cpu")
+    sim.run(10, record=path)
+    recording = Recording("render", path)
+    own = look_at(recording.stage, 0).camera
+    camera = overlook(recording, recording.frames(), ASPECT, own)
+    # The recording's own camera is kept where nothing leaves its picture.
+    assert (camera is own) == (speed == 0.0)
+    for x in (start, sim.position):
+        assert outside(camera, x, 0.1, room=1.0) < 1e-6
