@@ -13,6 +13,15 @@ from typing import Any
 import numpy as np
 
 
+def undefined(part: Any, method: str) -> NotImplementedError:
+    """The error for a subclass without a method that it must have; ``method``: with arguments."""
+    name = method.partition("(")[0]
+    return NotImplementedError(
+        f"{type(part).__name__}: {name} must be defined by the class, got none; "
+        f"write def {method} in it."
+    )
+
+
 def fail(owner: str, argument: str, condition: str, value: Any, remedy: str) -> ValueError:
     """The error of the house form, for the caller to raise."""
     text = np.array2string(value, threshold=6) if isinstance(value, np.ndarray) else repr(value)

@@ -49,6 +49,19 @@ def test_the_ten_lines_of_the_readme(tmp_path, monkeypatch):
     assert (tmp_path / "dam_break.usda").exists()
 
 
+def test_the_blocks_of_the_readme_run_one_after_the_other(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {"__name__": "readme"}
+    for number, code in enumerate(blocks()):
+        code = code.replace("frames=120", "frames=1").replace("progress=True", "progress=False")
+        path = tmp_path / f"block_{number}.py"  # a law needs its source
+        path.write_text(code.replace("spacing=0.025", "spacing=0.1"))
+        exec(compile(path.read_text(), path, "exec"), names)
+        # And what they made of it runs.
+        ps.Simulation(names["scene"], ps.Settings(dt=0.01), device="cpu").step()
+    assert names["sim"].world_count == 1024
+
+
 def law_source(name):
     """A law of the README as a file's worth of source."""
     (block,) = [block for block in blocks() if f"def {name}(" in block]

@@ -28,6 +28,7 @@ View = structure(
         "height": wp.int32,
         "tiles_x": wp.int32,
         "near": wp.float32,
+        "least": wp.float32,  # radius of the smallest spheres at depth 1
         "parallel": wp.float32,  # 1 or 0
     },
 )
@@ -141,12 +142,14 @@ def place_spheres(
     i = first + wp.tid()
     b = ball[i]
     c = to_view(view, wp.vec3(b[0], b[1], b[2]))
-    ball_out[i] = wp.vec4(c[0], c[1], c[2], b[3])
+    # What is smaller than a pixel would be seen in some frames and not in others.
+    r = wp.max(b[3], -c[2] * view.least)
+    ball_out[i] = wp.vec4(c[0], c[1], c[2], r)
     box = wp.vec4i(0, 0, 0, 0)
-    if b[3] > 0.0 and -c[2] + b[3] > view.near:
-        box = sample_box(view, sphere_reach(view, c, b[3]))
+    if b[3] > 0.0 and -c[2] + r > view.near:
+        box = sample_box(view, sphere_reach(view, c, r))
     box_out[i] = box
-    nearest_out[i] = -c[2] - b[3]
+    nearest_out[i] = -c[2] - r
     count_out[i] = tile_count(box)
 
 

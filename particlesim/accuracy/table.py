@@ -2,30 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ..output.files import whole
-
-
-def grid(heads: Iterable[tuple[str, Any]], rows: Iterable[Sequence[str]]) -> list[str]:
-    """Lines of columns; a head is a name, and ``"left"`` or ``"right"``."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE, show_edge=False, pad_edge=False)
-    for name, justify in heads:
-        table.add_column(name, justify=justify)
-    for row in rows:
-        table.add_row(*row)
-    stream = io.StringIO()
-    console = Console(file=stream, width=1000, color_system=None, markup=False, highlight=False)
-    console.print(table)
-    return [line.rstrip() for line in stream.getvalue().splitlines()]
 
 
 def shown(value: Any, digits: int = 3) -> str:

@@ -27,7 +27,6 @@ from .shell import (
     load,
     opened,
     simulation,
-    start_warp,
 )
 
 OWNER = "render"
@@ -93,6 +92,8 @@ def render(
         )  # fmt: skip
         path = Path(file)
         if path.suffix.lower() in USD:
+            from ..engine.start import start_warp
+
             start_warp(debug)
         elif request.is_film:
             raise validate.fail(
@@ -152,12 +153,27 @@ class Request:
         """Whether many pictures are asked for."""
         return self.out.suffix.lower() in film.FORMATS
 
-    def viewpoint(self, view: Any) -> Camera:
-        """The camera: the one asked for, or the file's own, or one that sees all."""
+    def viewpoint(self, recording: Any, frames: list[float], view: Any) -> Camera:
+        """The camera: the one asked for, or the file's own, or one that sees all frames.
+
+        The own one of a recording gives way in films whose particles leave its picture.
+
+        Args:
+            recording: An open recording.
+            frames: Time codes of the pictures.
+            view: What there is to see in the first of them.
+        """
         if self.camera is None:
-            points, radius = view.geometry.points()
-            aspect = self.width / self.height
-            return view.camera or Camera.around(points, view.up, aspect, radius)
+            from ..output.usd.recording import notes
+            from ..pictures.render.stage import overlook
+
+            # The camera that a recorder put there knew the first frame only.
+            fixed = view.camera is not None and not (self.is_film and notes(recording.stage))
+            return (
+                view.camera
+                if fixed
+                else overlook(recording, frames, self.width / self.height, view.camera)
+            )
         numbers = parse_numbers("--camera", self.camera, (6, 7), "px,py,pz,tx,ty,tz[,angle]")
         angle = numbers[6] if len(numbers) == 7 else FIELD_OF_VIEW
         return Camera(numbers[:3], numbers[3:6], view.up, angle)
@@ -228,7 +244,7 @@ def _pictures(
             recording = Recording(OWNER, recording.path)
         view = look_at(recording.stage, frame, paint)
         look = Look(up=view.up, ground=ground_height(view, request.ground))
-        camera = camera or request.viewpoint(view)
+        camera = camera or request.viewpoint(recording, frames, view)
         yield renderer.draw(view.geometry, camera, request.width, request.height, look).array
 
 

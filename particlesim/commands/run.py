@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ..output import files
 from ..output.progress import label
 from .scene_files import ready_scenes
 from .shell import (
@@ -203,6 +204,8 @@ def plot(
         from ..output.history.plots import plot_history
 
         picture = file.with_suffix(".png") if out is None else out
+        # Beside the file there may be a picture of something else.
+        files.check_new("plot", picture, overwrite, argument="--out", consent="give --overwrite")
         names = [word.strip() for word in what.split(",")] if what else None
         drawn = plot_history(file, picture, names, overwrite=overwrite)
         typer.echo(f"{', '.join(drawn)} of {file} drawn in {picture}")

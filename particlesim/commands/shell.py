@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-import tempfile
 import traceback
 from collections.abc import Iterator
 from types import ModuleType
@@ -79,6 +78,8 @@ def opened(debug: bool) -> Iterator[Meter]:
 def load(name: str, debug: bool) -> ModuleType:
     """The module of a scene; Warp is started for it."""
     with announced(f"{name}: loading"):
+        from ..engine.start import start_warp
+
         start_warp(debug)
         return load_scene(name)
 
@@ -109,31 +110,6 @@ def simulation(
 def wanted_frames(module: ModuleType, frames: int | None) -> int:
     """How many frames to run: as asked for, or the scene's own."""
     return getattr(module, "frames", DEFAULT_FRAMES) if frames is None else frames
-
-
-def start_warp(debug: bool) -> None:
-    """Start Warp, without a line for each module it loads and one for CUDA that is not there.
-
-    The latter is printed by its C code past every log level, so it is taken out of the stream.
-    ``debug``: let it say what it says.
-    """
-    import warp
-
-    if debug:
-        return
-    warp.config.log_level = warp.LOG_WARNING
-    stream = os.dup(2)
-    with tempfile.TemporaryFile() as printed:
-        os.dup2(printed.fileno(), 2)
-        try:
-            warp.init()
-        finally:
-            os.dup2(stream, 2)
-            os.close(stream)
-        printed.seek(0)
-        for line in printed.read().decode(errors="replace").splitlines():
-            if "Could not find or load the NVIDIA CUDA driver" not in line:
-                typer.echo(line, err=True)
 
 
 def describe(error: Exception) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from .. import validate
 from ..kernels.engine.integrate import integration_kernels, motion_type, tick_kernel
 from ..scene.settings import INTEGRATORS, Settings
 from .execution.launch import launch
@@ -75,7 +76,7 @@ class Integrator:
 
     def advance(self, dt: float) -> None:
         """After the forces, which are in ``state.force``."""
-        raise NotImplementedError
+        raise validate.undefined(self, "advance(self, dt)")
 
     def finish(self, dt: float) -> None:
         """After the constraints: velocities follow the projection, v += correction / dt.

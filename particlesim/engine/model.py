@@ -15,11 +15,12 @@ from ..kernels.self_check import fast_ways
 from ..scene.group import select
 from ..scene.scene import Scene
 from ..scene.settings import Settings
+from .start import start_warp
 
 
 def choose_device(device: Any) -> Any:
     """The Warp device of that name; None: CUDA where there is one, else the CPU."""
-    wp.init()
+    start_warp()
     cuda = wp.is_cuda_available()
     if device is None:
         return wp.get_device("cuda:0" if cuda else "cpu")

@@ -12,14 +12,16 @@ import warp as wp
 
 from ..engine.execution.launch import launch
 from ..engine.loop import Source
+from ..engine.report import Report, grid
 from ..kernels.engine.copy import QUANTITIES, block_sums_kernel
 
+SHOWN = 20  # worlds of a table
 BLOCK = 256  # particles summed by one thread
 
 
-@dataclass(frozen=True)
-class Diagnostics:
-    """Sums over the particles of each world, float64.
+@dataclass(frozen=True, repr=False)
+class Diagnostics(Report):
+    """Sums over the particles of each world, float64. ``str()`` makes a table.
 
     mass (worlds,), momentum (worlds, 3) and angular_momentum about the origin (worlds, 3);
     kinetic and potential energy, their sum ``energy``, and the virial sum of r.F over pairs,
@@ -37,6 +39,19 @@ class Diagnostics:
     def energy(self) -> np.ndarray:
         """Kinetic plus potential energy."""
         return self.kinetic + self.potential
+
+    def __str__(self) -> str:
+        heads = [("world" if len(self.mass) > 1 else "", "right")]
+        columns = [[str(w) if len(self.mass) > 1 else "" for w in range(len(self.mass))]]
+        for name in ("mass", "kinetic", "potential", "energy", "virial"):
+            heads.append((name, "right"))
+            columns.append([f"{value:.6g}" for value in getattr(self, name)])
+        for name in ("momentum", "angular_momentum"):
+            heads.append((name.replace("_", " "), "left"))
+            columns.append([" ".join(f"{x:.5g}" for x in row) for row in getattr(self, name)])
+        rows = list(zip(*columns, strict=True))
+        more = [f"and {len(rows) - SHOWN} more worlds"] if len(rows) > SHOWN else []
+        return "\n".join([*grid(heads, rows[:SHOWN]), *more])
 
 
 def measure(sim: Source, potentials: list[np.ndarray] | None = None) -> Diagnostics:

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 from ..engine.execution.launch import Launch, When
 from ..engine.frames import Frames
+from ..engine.report import Report
 
 
-@dataclass(frozen=True)
-class Explanation:
+@dataclass(frozen=True, repr=False)
+class Explanation(Report):
     """What one substep takes. ``str()`` makes the report.
 
     arrays: bytes per particle of each array of the state. lists: one line for each pair list.

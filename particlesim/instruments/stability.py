@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 import warnings
 import weakref
@@ -17,13 +16,14 @@ from ..constraints.constraint import Constraint
 from ..engine.limit import Limit, explicit_step
 from ..engine.loop import Loop
 from ..engine.probe import Probe
+from ..engine.report import Report, grid
 from ..interactions.fusion import fuse
 from ..scene.scene import Scene
 from ..scene.settings import AUTO, Settings
 
 
-@dataclass(frozen=True)
-class Stability:
+@dataclass(frozen=True, repr=False)
+class Stability(Report):
     """The limits of a simulation at one moment, the tightest first. ``str()`` makes a table.
 
     Args:
@@ -72,21 +72,16 @@ class Stability:
         )
 
     def _table(self) -> list[str]:
-        from rich import box
-        from rich.console import Console
-        from rich.table import Table
-
-        grid = Table(box=box.SIMPLE, show_edge=False, pad_edge=False)
-        for name in ("part", "limit", "substep", "where", "why"):
-            grid.add_column(name, justify="right" if name == "substep" else "left")
-        for each in self.limits:
-            step = "any" if math.isinf(each.dt) else f"{each.dt:.4g} s"
-            grid.add_row(each.part, each.kind, step, each.where, each.reason)
-        stream = io.StringIO()
-        Console(file=stream, width=1000, color_system=None, markup=False, highlight=False).print(
-            grid
+        names = ("part", "limit", "substep", "where", "why")
+        heads = [(name, "right" if name == "substep" else "left") for name in names]
+        steps = ["any" if math.isinf(each.dt) else f"{each.dt:.4g} s" for each in self.limits]
+        return grid(
+            heads,
+            [
+                (each.part, each.kind, step, each.where, each.reason)
+                for each, step in zip(self.limits, steps, strict=True)
+            ],
         )
-        return [line.rstrip() for line in stream.getvalue().splitlines()]
 
 
 PROVISIONAL = 1.0 / 60.0  # a frame's time while it is yet to be found

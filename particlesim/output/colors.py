@@ -16,6 +16,7 @@ import numpy as np
 from .. import validate
 
 STEPS = 256
+NEARLY_ALL = (0.01, 0.99)  # that a map spans: single particles fly off
 # Coefficients of 1, x, x^2, ... of each channel.
 POLYNOMIALS = {
     "viridis": (
@@ -59,6 +60,12 @@ def colored(values: Any, color_map: Any, lower: float, upper: float) -> np.ndarr
     # The nearest of many fine steps: much faster than blending three channels for each number.
     at = (np.clip(numbers, lower, upper) - lower) * ((len(steps) - 1) / (upper - lower))
     return np.take(steps, np.rint(at).astype(np.int32), axis=0)
+
+
+def spanned(values: np.ndarray) -> tuple[float, float]:
+    """Numbers that nearly all of some are between; all, where these would be one number."""
+    lower, upper = map(float, np.quantile(values, NEARLY_ALL))
+    return (lower, upper) if upper > lower else (float(values.min()), float(values.max()))
 
 
 def table(color_map: Any) -> np.ndarray:

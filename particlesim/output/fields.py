@@ -89,8 +89,9 @@ class ParticleColors:
         sim: The simulation.
         by: Name of the value (see :class:`ParticleFields`); vectors are coloured by their length.
         color_map: See :func:`particlesim.output.colors.colored`.
-        color_range: (lower, upper) numbers with the first and the last colour. None: the least
-            and the greatest in the first frame in which they differ; before, all have the first.
+        color_range: (lower, upper) numbers with the first and the last colour. None: those
+            that nearly all values of the frames so far are between; before any differ, all have
+            the first. So what starts from rest is not of one colour later.
         rows: The particles whose values make that range.
 
     Raises:
@@ -102,6 +103,7 @@ class ParticleColors:
         self.values = ParticleFields(sim, [by])
         colors.table(color_map)
         self.range: tuple[float, float] | None = None
+        self.grows = color_range is None
         if color_range is not None:
             self.range = _checked_range(color_range)
 
@@ -110,12 +112,18 @@ class ParticleColors:
         values = self.values.read()[self.by]
         if values.ndim == 2:
             values = np.sqrt(np.einsum("ij,ij->i", values, values))
-        if self.range is None:
-            drawn = values[self.rows]
-            if not len(drawn) or not drawn.max() > drawn.min():
-                return colors.colored(values, self.color_map, 0.0, 0.0)
-            self.range = (float(drawn.min()), float(drawn.max()))
-        return colors.colored(values, self.color_map, *self.range)
+        if self.grows:
+            self._grow(values[self.rows])
+        return colors.colored(values, self.color_map, *(self.range or (0.0, 0.0)))
+
+    def _grow(self, drawn: np.ndarray) -> None:
+        """Let the range hold nearly all of these too; all, where most are the same."""
+        if not len(drawn) or not drawn.max() > drawn.min():
+            return
+        lower, upper = colors.spanned(drawn)
+        if self.range is not None:
+            lower, upper = min(lower, self.range[0]), max(upper, self.range[1])
+        self.range = lower, upper
 
     def notes(self) -> dict[str, Any]:
         """What the colours mean, for legends and for going on with the same range."""
@@ -126,7 +134,7 @@ class ParticleColors:
 
     def restore(self, notes: Mapping[str, Any]) -> None:
         """Go on with the range of an earlier frame, from its notes."""
-        if self.range is None and "colorLower" in notes:
+        if self.grows and "colorLower" in notes:
             self.range = (float(notes["colorLower"]), float(notes["colorUpper"]))
 
 

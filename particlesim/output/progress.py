@@ -1,11 +1,15 @@
-"""Progress of a run: a bar on a terminal, the rate, and a summary."""
+"""Progress of a run: a bar on a terminal or in a notebook, the rate, and a summary."""
 
 from __future__ import annotations
 
 import contextlib
+import io
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
+
+INTERVAL = 0.2  # seconds between two pictures of a bar in a notebook
+WIDTH = 120  # of it, in letters
 
 
 def label(source: Any) -> str:
@@ -78,7 +82,7 @@ class Meter:
 def bar(
     label: str, unit: str, total: int | None = None, detail: str = ""
 ) -> Iterator[Callable[..., None]]:
-    """Show a bar on a terminal; yields ``show(done, total, doing="", detail="")``."""
+    """Show a bar on a terminal or in a notebook; yields ``show(done, total, doing, detail)``."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -93,14 +97,60 @@ def bar(
         TextColumn(unit), TextColumn("{task.fields[detail]}", markup=False), TimeRemainingColumn(),
     ]  # fmt: skip
     console = Console(stderr=True)
-    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+    hidden = not console.is_terminal
+    with (
+        Progress(*columns, console=console, disable=hidden) as progress,
+        _in_notebook(progress, console.is_jupyter) as draw,
+    ):
         task = progress.add_task(f"{label}: compiling", total=total, detail=detail)
 
         def show(done: int, total: int, doing: str = "", detail: str = "") -> None:
             words = f"{label}: {doing}" if doing else label
             progress.update(task, completed=done, total=total, description=words, detail=detail)
+            draw(done == total)
 
+        draw(True)
         yield show
+
+
+@contextlib.contextmanager
+def _in_notebook(progress: Any, there: bool) -> Iterator[Callable[[bool], None]]:
+    """Yields what draws a bar in one place of a notebook's page, at once or if it is time to.
+
+    Not by rich's own way, which asks for widgets, an extension that is often missing.
+    """
+    if not there:
+        yield lambda at_once: None
+        return
+    from IPython.display import display
+    from rich.console import Console
+
+    shown: Any = None
+    last = 0.0
+
+    def draw(at_once: bool) -> None:
+        nonlocal shown, last
+        now = time.perf_counter()
+        if not at_once and now - last < INTERVAL:
+            return
+        last = now
+        console = Console(
+            file=io.StringIO(), record=True, width=WIDTH, force_terminal=True, force_jupyter=False,
+            color_system="truecolor",
+        )  # fmt: skip
+        console.print(progress.get_renderable())
+        text = console.export_text(clear=False).strip()
+        styled = console.export_html(inline_styles=True, code_format="<pre>{code}</pre>")
+        content = {"text/plain": text, "text/html": styled}
+        if shown is None:
+            shown = display(content, raw=True, display_id=True)
+        else:
+            shown.update(content, raw=True)
+
+    try:
+        yield draw
+    finally:
+        draw(True)
 
 
 @contextlib.contextmanager

@@ -57,7 +57,7 @@ class Part:
 
     def prepare(self, model: Any, neighbors: Any) -> None:
         """Once: choose members, request neighbours, build parameter arrays and kernels."""
-        raise NotImplementedError
+        raise validate.undefined(self, "prepare(self, model, neighbors)")
 
     def attach(self, model: Any, state: Any) -> None:
         """Once, when all arrays exist: gather them into the structs that the kernels take."""
@@ -115,7 +115,7 @@ class Interaction(Part):
 
     def apply(self, state: Any, neighbors: Any, dt: float) -> None:
         """Add forces: launches only."""
-        raise NotImplementedError
+        raise validate.undefined(self, "apply(self, state, neighbors, dt)")
 
     def measure(self, state: Any, energy: Any, virial: Any) -> None:
         """Add the potential energy and the virial of each particle (float64), on demand."""
@@ -150,7 +150,7 @@ class ConstraintBase(Part):
 
     def project(self, state: Any, neighbors: Any, dt: float) -> None:
         """One sweep: launches only."""
-        raise NotImplementedError
+        raise validate.undefined(self, "project(self, state, neighbors, dt)")
 
     def finish(self, state: Any, neighbors: Any, dt: float) -> None:
         """After the velocities have followed: restitution, breaking. Launches only."""

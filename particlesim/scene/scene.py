@@ -27,7 +27,8 @@ class Scene:
     """Particles, interactions and constraints, as a description.
 
     Args:
-        up_axis: ``"x"``, ``"y"`` or ``"z"``; used by scenes' gravity and by exports.
+        up_axis: ``"y"`` or ``"z"``: what pictures and USD show as up; nothing else minds it. With
+            ``"x"`` both are refused, for USD, which pictures rest on too, knows Y and Z only.
         meters_per_unit: Length of one unit [m], for exports.
         periodic: ``(lower, upper)`` corners of a periodic box; None on an axis leaves it open:
             ``((0, None, 0), (1, None, 1))``. None: open everywhere.
@@ -85,7 +86,8 @@ class Scene:
             group: Name, unique in the scene; None: ``group_<k>``.
             pinned: One for all, or (n,) bool; a pinned particle has infinite mass for forces
                 and constraints and keeps its velocity.
-            color: (r, g, b) in 0..1, for exports.
+            color: (r, g, b) in 0..1 for pictures and exports, in linear light as USD has it: a
+                share s of sRGB, as most colour pickers show it, is about s^2.2.
             triangles: (t, 3) int into these particles, counterclockwise from outside: exports draw
                 the group as this surface.
             **attributes: Further per-particle values that laws may name (``charge=...``): one

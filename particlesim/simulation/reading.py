@@ -174,7 +174,8 @@ class Reading(Access):
             path: File to write too, ``.png``, ``.jpg`` or ``.webp``.
             width: In pixels.
             height: In pixels.
-            camera: None: one that sees all.
+            camera: None: one that sees all; of more than 1000 particles, it may leave out up to
+                1 % at each edge that are far off.
             color: Name of a value to colour particles by, as ``color_by`` of
                 ``ps.UsdRecorder``; None: each group has its own colour.
             **options: ``color_map``, ``color_range``, ``worlds``, ``groups``, ``layout`` and

@@ -108,7 +108,7 @@ class Simulation(Reading):
         *,
         record: Any = None,
         overwrite: bool = False,
-        fields: Iterable[str] = (),
+        fields: str | Iterable[str] = (),
         progress: bool | Callable[[int, int], None] = False,
         history: Any = None,
         checkpoint: int | None = None,
@@ -127,8 +127,9 @@ class Simulation(Reading):
                 ``.usd`` or ``.usdc`` (UsdRecorder), ``.npz``, ``.ply``, ``.gsd`` or ``.vtkhdf``
                 (:func:`particlesim.output.recorders.open_recorder`).
             overwrite: Replace an existing output.
-            fields: Names of further per-particle arrays to record.
-            progress: True for a bar on the terminal, or a function of (frame, frames).
+            fields: Names of further per-particle arrays to record, or one.
+            progress: True for a bar on a terminal or in a notebook; or a function of
+                (frame, frames).
             history: Path of a ``.csv`` or ``.jsonl`` file to write energies, momenta and errors of
                 the start and every frame to (see ``ps.History``).
             checkpoint: Frames from one checkpoint to the next; 0: none. None: by the clock, at
@@ -145,10 +146,11 @@ class Simulation(Reading):
         from .run import run
 
         validate.whole("Simulation.run", "frames", frames)
+        names = (fields,) if isinstance(fields, str) else tuple(fields)
         warn_if_past(self.loop)
         run(
             self, self.step, frames, record=record, progress=progress, history=history,
-            overwrite=overwrite, checkpoint=checkpoint, resume=resume, fields=tuple(fields),
+            overwrite=overwrite, checkpoint=checkpoint, resume=resume, fields=names,
             **options,
         )  # fmt: skip
 

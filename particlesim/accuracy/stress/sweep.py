@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from ... import validate
+from ...engine.report import Report, grid
 from ...instruments.watchdog.incident import SimulationError
 from ...scene.scene import Scene
 from ...scene.settings import Settings
 from ..study import Plan, Study
-from ..table import grid
 from .cases import Case, cases
 from .trace import Trace
 
@@ -37,8 +37,8 @@ class Result:
     stopped: bool = False
 
 
-@dataclass(frozen=True)
-class Stress:
+@dataclass(frozen=True, repr=False)
+class Stress(Report):
     """All cases of a sweep; ``str()`` makes the table."""
 
     results: tuple[Result, ...]

@@ -11,8 +11,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ...engine.report import grid
 from ...output.files import check_new
-from ..table import amount, grid, shown, write
+from ..table import amount, shown, write
 from .row import Row
 
 FORMATS = (".json", ".csv")

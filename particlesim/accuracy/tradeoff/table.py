@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ... import validate
+from ...engine.report import Report
 from ..table import amount
 from . import output
 from .plot import plot
@@ -19,8 +20,8 @@ from .row import Row, fitted_order
 STEPS = ("dt",)  # of these less is finer
 
 
-@dataclass(frozen=True)
-class Tradeoff:
+@dataclass(frozen=True, repr=False)
+class Tradeoff(Report):
     """What the settings of a sweep cost, and how accurate they are. ``str()`` makes the table.
 
     Args:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ...engine.report import Report
 from ...scene.settings import Settings
 from ..table import assignments
 
@@ -43,8 +44,8 @@ class Trial:
         return f"{knobs}: error {self.error:.3g}, {self.cost:.3g} s per s"
 
 
-@dataclass(frozen=True)
-class Tuned:
+@dataclass(frozen=True, repr=False)
+class Tuned(Report):
     """The cheapest settings under a tolerance. ``str()`` makes a report.
 
     Args:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ... import validate
+from ...engine.report import Report
 from .accounts import Accounts
 
 
@@ -27,8 +28,8 @@ class Entry:
     angular_impulse: np.ndarray
 
 
-@dataclass(frozen=True)
-class Ledger:
+@dataclass(frozen=True, repr=False)
+class Ledger(Report):
     """What every interaction and constraint has done to the particles that are not pinned.
 
     ``ledger[name]`` is the :class:`Entry` of that name; the second of a name has `` 2`` behind it.

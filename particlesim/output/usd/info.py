@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Usd, UsdGeom
 
+from ...engine.report import Report
 from .recording import Recording, notes, prims, quiet, read
 
 COUNTED = {  # which array says how many there are, and what they are called
@@ -40,8 +41,8 @@ class PrimInfo:
     size: int
 
 
-@dataclass(frozen=True)
-class Info:
+@dataclass(frozen=True, repr=False)
+class Info(Report):
     """What :func:`info` found; ``str`` shows it as a table."""
 
     path: Path

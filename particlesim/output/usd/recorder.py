@@ -57,8 +57,9 @@ class UsdRecorder(Recorder):
             length. None: each group has its own colour, as surfaces of fluids always have.
         color_map: ``"viridis"``, ``"magma"``, ``"cubehelix"``, ``"coolwarm"``, ``"gray"``, or
             colours (k, 3), linear.
-        color_range: (lower, upper) numbers with the first and the last colour; None: the least
-            and the greatest in the first frame in which particles differ.
+        color_range: (lower, upper) numbers with the first and the last colour; None: those
+            that nearly all values of the frames so far are between, so the range may grow; each
+            frame's file notes its own.
         instancer: Draw groups as a PointInstancer of spheres. Files are larger, and Blender shows
             no colours of instances.
         surface: Draw the fluid of each SPH as one mesh a frame, its surface, and leave its

@@ -13,7 +13,7 @@ from ... import validate
 FIELD_OF_VIEW = 32.3  # degrees; a lens of 35 mm on a picture 20.25 mm high
 VIEW = (0.35, 0.35, 1.0)  # from what is seen to the camera: right, up, out
 ROOM = 1.05  # of the picture, around what is seen
-CENTERINGS = 8
+NEAREST = 0.25  # of the size of what is seen: no nearer is the camera to it
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,38 +77,93 @@ class Camera:
     def around(cls, points: Any, up: Any, aspect: float, radius: Any = 0.0) -> Camera:
         """The nearest camera that sees all of some points, from a little to the right and above.
 
-        The right edge of the picture, of slope k, touches the points that are highest in
-        a / k + c, with a to the right and c towards the camera; the left one those in -a / k + c.
-        That gives the distance and the middle; likewise for up and down.
-
         Args:
             points: (n, 3) [length], at least one.
             up: (3,).
             aspect: Width of the picture over its height.
             radius: Of spheres around the points, one or (n,) [length].
         """
-        x = np.asarray(points, dtype=np.float64)
+        framing = Framing(up, aspect)
+        framing.add(points, radius)
+        return framing.camera()
+
+    def sees(self, points: Any, radius: Any, aspect: float, share: float = 1.0) -> bool:
+        """Whether a share of some spheres, as of :meth:`around`, is within each edge."""
+        if not len(points):
+            return True
+        x = np.asarray(points, dtype=np.float64) - self.position
+        right, up, back = self.axes @ x.T
+        edges = []
+        for along, k in ((right, self.slope * aspect), (up, self.slope)):
+            edges += [side + k * back + radius * math.hypot(1.0, k) for side in (along, -along)]
+        return all(_most(edge, share) <= 0.0 for edge in edges)
+
+
+class Framing:
+    """What a camera has to see, which may come in parts: of one frame, or of many.
+
+    The right edge of the picture, of slope k, touches the spheres that are highest in
+    a / k + c + r sqrt(1 + 1 / k^2), with a to the right and c towards the camera; the left one
+    those in -a / k + c + ...; likewise for up and down. That gives the distance and the middle:
+    as far from one edge as from the other.
+
+    Args:
+        up: (3,).
+        aspect: Width of the picture over its height.
+    """
+
+    def __init__(self, up: Any, aspect: float):
+        self.up = np.asarray(up, dtype=np.float64)
         # Up and out as in scenes whose up is y; for z the camera looks along y.
         out = (0.0, -1.0, 0.0) if abs(up[2]) > max(abs(up[0]), abs(up[1])) else (0.0, 0.0, 1.0)
-        right = np.cross(up, out)
-        back = np.array(VIEW) @ np.array([right, np.asarray(up, dtype=np.float64), out])
-        axes = view_axes(back, up)
-        middle = 0.5 * (x.min(axis=0) + x.max(axis=0))
-        *across, depth = axes @ (x - middle).T
+        back = np.array(VIEW) @ np.array([np.cross(self.up, out), self.up, out])
+        self.axes = view_axes(back, self.up)
         slope = math.tan(math.radians(0.5 * FIELD_OF_VIEW)) / ROOM
-        offsets, distance = [], 0.0
-        for along, k in zip(across, (slope * aspect, slope), strict=True):
-            reach = np.asarray(radius) * math.hypot(1.0, 1.0 / k)
-            first, second = (np.max(side / k + depth + reach) for side in (along, -along))
-            offsets.append(0.5 * k * (first - second))
-            distance = max(distance, 0.5 * (first + second))
-        distance = distance or 1.0
-        for _ in range(CENTERINGS):  # the direction that has room: as much on either side
-            for each, along in enumerate(across):
-                seen = (along - offsets[each]) / (distance - depth)
-                offsets[each] += 0.5 * distance * float(seen.min() + seen.max())
-        target = middle + offsets @ axes[:2]
-        return cls(target + distance * axes[2], target, up)
+        self.slopes = (slope * aspect, slope)
+        self.reached = np.full((2, 2), -np.inf)  # right and left, up and down
+        self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)  # along the axes
+
+    def add(self, points: Any, radius: Any = 0.0, share: float = 1.0) -> None:
+        """Points (n, 3) that are to be seen, as spheres; ``share``: how many, at each edge."""
+        x = np.asarray(points, dtype=np.float64)
+        if not len(x):
+            return
+        r = np.broadcast_to(np.asarray(radius, dtype=np.float64), len(x))
+        seen = self.axes @ x.T
+        for axis, k in enumerate(self.slopes):
+            reach = seen[2] + r * math.hypot(1.0, 1.0 / k)
+            for side, along in enumerate((seen[axis], -seen[axis])):
+                most = _most(along / k + reach, share)
+                self.reached[axis, side] = max(self.reached[axis, side], most)
+        for axis, along in enumerate(seen):
+            self.low[axis] = min(self.low[axis], -_most(r - along, share))
+            self.high[axis] = max(self.high[axis], _most(along + r, share))
+
+    @property
+    def distance(self) -> float:
+        """From the middle of what is seen to the camera [length]."""
+        size = float(np.linalg.norm(self.high - self.low))
+        front = self.high[2] + (NEAREST * size or 1.0)
+        needed = max(float(0.5 * each.sum()) for each in self.reached)
+        return float(max(front, needed) - 0.5 * (self.low[2] + self.high[2]))
+
+    def camera(self) -> Camera:
+        """The nearest camera that sees all that was added; of nothing, one that sees the origin."""
+        if not np.isfinite(self.reached).all():
+            self.add([(0.0, 0.0, 0.0)], 1.0)
+        middle = [
+            0.5 * k * (first - second)
+            for k, (first, second) in zip(self.slopes, self.reached, strict=True)
+        ]
+        target = np.array([*middle, 0.5 * (self.low[2] + self.high[2])]) @ self.axes
+        return Camera(target + self.distance * self.axes[2], target, self.up)
+
+
+def _most(values: np.ndarray, share: float) -> float:
+    """What a share of the values is not above."""
+    if share == 1.0:
+        return float(values.max())
+    return float(np.quantile(values, share, method="higher"))
 
 
 def view_axes(back: Any, up: Any) -> np.ndarray:

@@ -75,7 +75,7 @@ def _job(
 ) -> dict[str, Any]:
     """What the other process needs to know, as plain values; directions in the stage's space."""
     view = look_at(recording.stage, frames[0], paint)
-    camera = request.viewpoint(view)
+    camera = request.viewpoint(recording, frames, view)
     look = looks.Look(up=view.up)
     ramp = None
     if paint.color_by is not None:

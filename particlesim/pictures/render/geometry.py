@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+SHAPES = ("ball", "cone", "wire", "corner", "veil")
+
 
 @dataclass(eq=False)
 class Geometry:
@@ -81,15 +83,17 @@ class Geometry:
     @property
     def box(self) -> np.ndarray:
         """Lower and upper corner of all, (2, 3) [length]; the unit box where there is nothing."""
-        box = self.box_of("ball", "cone", "wire", "corner", "veil")
+        box = self.box_of(*SHAPES)
         return np.array([[-0.5] * 3, [0.5] * 3]) if box is None else box
 
-    def points(self) -> tuple[np.ndarray, np.ndarray]:
-        """What is on the outside: (n, 3) and the radii there, (n,); the origin, of nothing."""
-        rows = [self.array(name) for name in ("ball", "cone", "wire", "corner", "veil")]
-        widened = [r if r.shape[1] == 4 else _with_radius(r, 0.0) for r in rows]
-        found = np.concatenate(widened)
-        found = found if len(found) else np.array([[0.0, 0.0, 0.0, 1.0]], dtype=np.float32)
+    def points(self, *names: str) -> tuple[np.ndarray, np.ndarray]:
+        """What is on the outside of what is named (see :meth:`array`), or of all shapes.
+
+        Returns:
+            Points (n, 3) and the radii there, (n,).
+        """
+        rows = [self.array(name) for name in names or SHAPES]
+        found = np.concatenate([r if r.shape[1] == 4 else _with_radius(r, 0.0) for r in rows])
         return found[:, :3], found[:, 3]
 
     def box_of(self, *names: str) -> np.ndarray | None:

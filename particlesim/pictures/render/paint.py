@@ -14,7 +14,6 @@ from ...output import colors
 from ...output.usd.recording import notes, prims
 
 PLAIN = (0.6, 0.6, 0.6)  # of what has no colour
-QUANTILES = (0.01, 0.99)  # that a colour map spans: single particles fly off
 MOST_SCANNED = 8  # frames
 NO_VALUES = {"displayColor", "displayOpacity", "st", "pid"}
 
@@ -94,8 +93,7 @@ def spanned(stage: Usd.Stage, name: str, frames: Sequence[float]) -> tuple[float
     found = list(_values(stage, name, scanned(frames)))
     if not found:
         return 0.0, 1.0
-    lower, upper = np.quantile(np.concatenate(found), QUANTILES)
-    return float(lower), float(upper)
+    return colors.spanned(np.concatenate(found))
 
 
 def scanned(frames: Sequence[float]) -> list[float]:

@@ -17,6 +17,7 @@ from .camera import Camera
 from .geometry import Geometry
 from .image import FORMATS, Image, pillow
 from .look import BACKGROUND, Look
+from .overview import overview
 from .renderer import Renderer
 from .stage import View
 
@@ -60,8 +61,7 @@ def render(
         supersample=supersample,
     )  # fmt: skip
     if camera is None:
-        points, radius = view.geometry.points()
-        camera = Camera.around(points, view.up, width / height, radius)
+        camera = overview(view.geometry, view.up, width / height)
     image = draw(view.geometry, camera, width, height, look, sim.model.device)
     if path is not None:
         image.save(path, overwrite=overwrite)

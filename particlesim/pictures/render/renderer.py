@@ -20,6 +20,7 @@ from .screen import Crew, Screen, make_view, placed
 
 SHADOW_SIZE = 1024  # samples along a side of the shadow map
 OCCLUSION_SAMPLES = 8
+LEAST = 0.71  # samples, half their diagonal: a sphere of this radius holds the middle of one
 LARGEST = 16384  # samples along a side
 
 
@@ -96,7 +97,13 @@ class _Drawing:
         reach = float(np.linalg.norm(self.eye - self.bounds.center)) + self.bounds.radius
         slope = (camera.slope * width / height, camera.slope)
         self.view = make_view(
-            self.axes, self.eye, slope, width * self.step, height * self.step, near=1e-5 * reach
+            self.axes,
+            self.eye,
+            slope,
+            width * self.step,
+            height * self.step,
+            near=1e-5 * reach,
+            least=max(0.5 * self.step, LEAST),
         )
         bodies = {"ball": wp.vec4, "cone": wp.vec4, "corner": wp.vec3}
         self.bodies = {name: crew.array(geometry.array(name), bodies[name]) for name in bodies}

@@ -12,6 +12,7 @@ import warp as wp
 from ...engine.execution.executors import available_threads
 from ...engine.execution.launch import Launch
 from ...engine.execution.threads import Chain, Team
+from ...engine.start import start_warp
 from ...kernels.pictures import draw as render_draw
 from ...kernels.pictures import view as render_view
 from ...kernels.pictures.shapes import Shapes
@@ -29,6 +30,7 @@ class Crew:
     """
 
     def __init__(self, device: Any = None, threads: int | None = None):
+        start_warp()
         self.device = wp.get_device(device)
         self.threads = (threads or available_threads()) if self.device.is_cpu else 1
         self._kept: dict[str, wp.array] = {}
@@ -77,8 +79,12 @@ def make_view(
     height: int,
     near: float,
     parallel: bool = False,
+    least: float = 0.0,
 ) -> Any:
-    """The kernels' view (see :mod:`particlesim.kernels.pictures.view`)."""
+    """The kernels' view (see :mod:`particlesim.kernels.pictures.view`).
+
+    ``least``: radius of the smallest spheres, in samples.
+    """
     view = render_view.View()
     view.right, view.up, view.back = (wp.vec3(*map(float, axis)) for axis in axes)
     view.eye = wp.vec3(*map(float, eye))
@@ -86,7 +92,7 @@ def make_view(
     view.sample = wp.vec2(2.0 * slope[0] / width, 2.0 * slope[1] / height)
     view.width, view.height = width, height
     view.tiles_x = math.ceil(width / int(render_view.TILE))
-    view.near, view.parallel = near, float(parallel)
+    view.near, view.parallel, view.least = near, float(parallel), least * view.sample[1]
     return view
 
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from pxr import Usd, UsdGeom
 
 from ...output.usd.layout import is_boundary
-from ...output.usd.recording import prims, up_axis
+from ...output.usd.recording import PORTION, Recording, prims, up_axis
 from ...output.usd.writing.geometry import posed
 from .camera import Camera
 from .geometry import Geometry
+from .overview import Overview
 from .paint import Paint
 from .prims import PrimReader
 
@@ -69,6 +71,20 @@ def look_at(stage: Usd.Stage, frame: float, paint: Paint | None = None) -> View:
             scanned.PruneChildren()  # its prototypes are no prims of their own
     floor = min(heights, default=None)
     return View(geometry, up, None if floor is None else floor - _sunk(geometry), camera)
+
+
+def overlook(
+    recording: Recording, frames: Sequence[float], aspect: float, own: Camera | None
+) -> Camera:
+    """The camera of some frames: the own one if that sees the particles in each, or an overview."""
+    framed = Overview(up_axis(recording.stage), aspect)
+    for number, frame in enumerate(frames):
+        if number and number % PORTION == 0:  # a stage keeps all clips open that it has read
+            recording = Recording("render", recording.path)
+        geometry = look_at(recording.stage, frame).geometry
+        framed.add(geometry)
+        own = own if own is not None and framed.seen_by(own, geometry) else None
+    return own or framed.camera()
 
 
 def _hidden(image: UsdGeom.Imageable, time: Usd.TimeCode) -> bool:

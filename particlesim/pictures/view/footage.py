@@ -13,7 +13,7 @@ import numpy as np
 from ... import validate
 from ...output import colors
 from ...output.usd.recording import PORTION, Recording, notes, quiet, up_axis
-from ..render.camera import Camera
+from ..render.overview import overview
 from ..render.paint import Paint, field_names, scanned, spanned
 from ..render.stage import look_at
 from . import cast
@@ -61,7 +61,7 @@ class Footage:
         with self._lock, quiet():
             stage = self._fresh().stage
             first = look_at(stage, self._first)
-            camera = first.camera or Camera.around(first.geometry.box, first.up, WIDE)
+            camera = first.camera or overview(first.geometry, first.up, WIDE)
             fps = stage.GetTimeCodesPerSecond() or 24.0
             return {
                 "title": self.path.name,

@@ -76,11 +76,15 @@ def test_the_command_line(tmp_path, monkeypatch, capsys):
     assert cli.main(["plot", "out.csv", "--what", "energy,drift"]) == 0
     assert "energy, drift of out.csv drawn in out.png" in capsys.readouterr().out
     assert (tmp_path / "out.png").exists()
+    (tmp_path / "out.png").write_text("a picture of something else")
     assert cli.main(["plot", "out.csv"]) == 2
+    assert "--out must be a new file, got 'out.png'" in capsys.readouterr().err
+    assert (tmp_path / "out.png").read_text() == "a picture of something else"
+    assert cli.main(["plot", "out.csv", "--overwrite"]) == 0
     assert cli.main(words) == 2
     assert cli.main(["plot", "none.csv", "--out", "b.png"]) == 2
     errors = capsys.readouterr().err
-    assert errors.count("error: ") == errors.count("\n") == 3
+    assert errors.count("error: ") == errors.count("\n") == 2
 
 
 def test_a_plot_without_matplotlib(tmp_path, monkeypatch):

@@ -144,7 +144,7 @@ def test_colors_follow_a_value_through_a_map(tmp_path, device):
     np.testing.assert_allclose(found, share[:, None] * ramp[1], atol=0.5 / 255 + 1e-6)
 
 
-def test_the_range_of_colors_is_that_of_the_first_frame_that_has_one(tmp_path, device):
+def test_the_range_of_colors_is_that_of_the_frames_so_far(tmp_path, device):
     scene = flying()
     scene.add_interaction(ps.ParticleForce(push))
     sim = ps.Simulation(scene, SETTINGS, device=device)
@@ -152,12 +152,40 @@ def test_the_range_of_colors_is_that_of_the_first_frame_that_has_one(tmp_path, d
     _, velocity = record(sim, tmp_path / "out.usda", 3, color_by="speed", groups=["b"])
     stage = checked(tmp_path / "out.usda")
     speed = np.linalg.norm(velocity, axis=-1)[:, 4:]
-    for frame, (lower, upper) in enumerate([(0, 0)] + 3 * [(speed[1].min(), speed[1].max())]):
+    assert not speed[0].any() and speed[3].max() > speed[1].max()
+    for frame in range(4):
+        spans = (
+            np.quantile(speed[1 : frame + 1], (0.01, 0.99), axis=1) if frame else np.zeros((2, 1))
+        )
+        lower, upper = spans[0].min(), spans[1].max()
         found = value(stage, "/World/env_0000/b.primvars:displayColor", frame)
         np.testing.assert_array_equal(found, colored(speed[frame], "viridis", lower, upper))
     clip = Sdf.Layer.FindOrOpen(str(tmp_path / "out.clips/f.000003.usdc"))
     notes = clip.customLayerData["particlesim"]
-    assert (notes["colorLower"], notes["colorUpper"]) == (speed[1].min(), speed[1].max())
+    assert (notes["colorLower"], notes["colorUpper"]) == (lower, upper)
+
+
+def test_what_starts_from_rest_is_not_of_one_colour(tmp_path, device):
+    rng = np.random.default_rng(0)
+    scene = ps.Scene()
+    scene.add_particles(
+        rng.uniform(0, 1, (2000, 3)), radius=0.01, group="dust", pace=rng.uniform(0, 1, 2000)
+    )
+
+    @ps.law
+    def hasten(pace: float):
+        return wp.vec3(pace, 0.0, 0.0)
+
+    scene.add_interaction(ps.ParticleForce(hasten))
+    sim = ps.Simulation(scene, SETTINGS, device=device)
+    record(sim, tmp_path / "out.usda", 20, color_by="speed")
+    stage = checked(tmp_path / "out.usda")
+    last = colored([1.0], "viridis", 0.0, 1.0)
+    for frame in (1, 2, 10, 20):
+        found = value(stage, "/World/env_0000/dust.primvars:displayColor", frame)
+        # 1 % are beyond the range, and half of the last of 256 steps.
+        assert np.mean((found == last).all(axis=1)) < 0.02
+        assert len(np.unique(found, axis=0)) > 200
 
 
 def test_a_resumed_recording_keeps_its_range_of_colors(tmp_path, device):
@@ -166,10 +194,11 @@ def test_a_resumed_recording_keeps_its_range_of_colors(tmp_path, device):
     with ps.UsdRecorder(sim, path, color_by="speed") as out:
         out.write()
     sim.step()
-    sim.velocity = 2 * sim.velocity  # a range of its own would be another
+    sim.velocity = 2 * sim.velocity  # a range of its own would be from 2
     with ps.UsdRecorder(sim, path, color_by="speed", resume=0) as out:
         out.write()
     stage = checked(path)
-    speed = np.linalg.norm(sim.velocity[:4], axis=1)
+    speed = np.linalg.norm(sim.velocity, axis=1)
     found = value(stage, "/World/env_0000/a.primvars:displayColor", 1)
-    np.testing.assert_array_equal(found, colored(speed, "viridis", 1.0, 14.0))
+    lower, upper = np.quantile(speed / 2, 0.01), np.quantile(speed, 0.99)
+    np.testing.assert_array_equal(found, colored(speed[:4], "viridis", lower, upper))
