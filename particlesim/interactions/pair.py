@@ -92,6 +92,7 @@ class Pair(Interaction):
         self.model = model
         for each in self.arguments:
             each.check(model.attributes)
+        self.functions = [each.function(model.precision) for each in self.laws]  # as they are now
         self.pairs = neighbors.of(self, self.quantities)
         columns = self.columns(self.parameters)
         cutoff = None if self.cutoff is None else np.array([peer.cutoff for peer in self.peers])
@@ -113,8 +114,8 @@ class Pair(Interaction):
         """A term of the k-th law."""
         precision = self.model.precision
         arguments = self.arguments[k].source({"_i": "i", "_j": "j"})
-        law = self.laws[k].function(precision)
-        return make(law, arguments, precision, self.loop.Data, self.Params, **options)
+        law, Data = self.functions[k], self.loop.Data
+        return make(law, arguments, precision, Data, self.Params, **options)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         self.loop.sum(self.term, kernels.add_force, {"f": state.force}, 3)

@@ -98,6 +98,8 @@ class PairSum:
         self.of_pair = self._bound(law, ("_i", "_j"), PAIR, earlier)
         self.of_one = None if then is None else self._bound(then, ("",), ("total",), earlier)
         self.last = self.of_one or self.of_pair
+        bound = {self.of_pair, self.last}
+        self.functions = {each: each.law.function(model.precision) for each in bound}
         self.kept = self._checked(earlier)
         self.names = (self.of_pair.quantities | self.last.quantities) - self.kept.keys()
         part.requires = part.requires | self.names
@@ -189,7 +191,7 @@ class PairSum:
         self, bound: Arguments, index: Mapping[str, str], extra: Mapping[str, str]
     ) -> tuple[wp.Function, list[str]]:
         """A law's function, and the source of its arguments."""
-        return bound.law.function(self.model.precision), bound.source(index, extra, READ)
+        return self.functions[bound], bound.source(index, extra, READ)
 
 
 def _parameters(part: Interaction) -> dict[str, Any]:

@@ -20,7 +20,7 @@ import numpy as np
 import warp as wp
 
 from .group import Group, select
-from .law import Law
+from .law import Key, Law
 from .part import Part
 from .scene import Scene
 
@@ -182,8 +182,8 @@ def _plain(value: Any) -> Any:
         return [_plain(each) for each in value]
     if isinstance(value, type):
         return value.__name__
-    if isinstance(value, CodeType):
-        return _signature(value.co_name, value)
+    if isinstance(value, Key):
+        return [value.signature, *(_plain(each) for each in value.closure)]
     if isinstance(value, Law):
         value = value.func
     if isinstance(value, wp.Function):
