@@ -94,7 +94,8 @@ class Pair(Interaction):
         self.model = model
         for each in self.arguments:
             each.check(model.attributes)
-        self.functions = [each.function(model.precision) for each in self.laws]  # as they are now
+        # Of the laws as they are now.
+        self.functions = [each.function(model.precision, self.name, float) for each in self.laws]
         self.pairs = neighbors.of(self, self.quantities)
         columns = self.columns(self.parameters)
         cutoff = None if self.cutoff is None else np.array([peer.cutoff for peer in self.peers])

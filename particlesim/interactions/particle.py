@@ -98,7 +98,11 @@ class ParticleForce(Interaction):
         for each in self.arguments:
             each.check(model.attributes)
         # Of the laws as they are now.
-        self.functions = [each.law.function(model.precision) for each in self.arguments]
+        self.functions = [
+            each.function(model.precision, self.name, kind)
+            for each, kind in ((self.law, wp.vec3), (self.potential, float))
+            if each is not None
+        ]
         members = model.members([peer.group for peer in self.peers], self.name)
         self.count = len(members)
         self.members = model.array(members, wp.int32)

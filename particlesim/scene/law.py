@@ -16,6 +16,7 @@ import warp as wp
 from .. import validate
 from ..kernels.precision import Precision, definition, translate
 from ..kernels.warp_internals import digest, written_in_python
+from .law_errors import check
 
 UNROLLED = 16  # rounds up to which Warp writes a loop out
 
@@ -48,7 +49,7 @@ class Law:
             self.parameters[name] = parameter.annotation
             if parameter.default is not parameter.empty:
                 self.defaults[name] = parameter.default
-        self._functions: dict[tuple[str, str], wp.Function] = {}
+        self._functions: dict[tuple[str, str, Any], wp.Function] = {}
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         return self.func(*args, **kwargs)
@@ -118,13 +119,29 @@ class Law:
             if isinstance(helper, Law) and helper.func is not self.func:
                 helper.check_derivable(owner)
 
-    def function(self, precision: Precision) -> wp.Function:
-        """The Warp function in ``precision``, of what the law names at present."""
-        key = precision.name, self.content
+    def function(
+        self, precision: Precision, owner: str = "law", returns: Any = None
+    ) -> wp.Function:
+        """The Warp function in ``precision``, of what the law names at present.
+
+        Args:
+            precision: Its floats and vectors are of it.
+            owner: For errors, whoever uses the law.
+            returns: What it must return, float or a vector type; None: anything.
+
+        Raises:
+            ValueError: Warp cannot compile it, or it returns something else.
+        """
+        key = precision.name, self.content, returns
         if key not in self._functions:
-            self._functions[key] = translate(
-                self.func, precision, lambda value: _helper(value, precision), self.source
-            )
+
+            def helper(value: Any) -> Any:
+                value = _as_law(value)
+                return value.function(precision, owner) if isinstance(value, Law) else value
+
+            made = translate(self.func, precision, helper, self.source)
+            check(owner, self.source, made, precision, returns)
+            self._functions[key] = made
         return self._functions[key]
 
 
@@ -149,12 +166,6 @@ def _content(value: Any, owner: Law) -> str:
     return (
         repr(value) if known or type(value).__module__.startswith("warp") else type(value).__name__
     )
-
-
-def _helper(value: Any, precision: Precision) -> Any:
-    """What a law that names ``value`` calls in ``precision``."""
-    value = _as_law(value)
-    return value.function(precision) if isinstance(value, Law) else value
 
 
 def _as_law(value: Any) -> Any:
