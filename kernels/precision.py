@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from .choices import derivable, passed, taken
 from .extremes import larger, smaller, within
 from .warp_internals import compiled, digest, is_after_gradients, named_function
 
@@ -32,6 +33,7 @@ _VECTORS = (*_DOUBLE.values(), *(getattr(wp, name) for name in _DOUBLE))
 _DOUBLE["float32"] = wp.float64
 # What laws call in place of Warp's own, so that their derivatives vectorise.
 _EXTREMES = {"max": larger, "min": smaller, "clamp": within}
+_CHOICES = {"taken": taken, "passed": passed}
 
 
 # Coincident particles part along this direction, or with its components' signs turned.
@@ -86,7 +88,7 @@ class _Rewriter(ast.NodeTransformer):
         return _name("_float64", node) if self.double and node.id == "float" else node
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
-        owner = self._meaning(node.value)
+        owner = self.meaning(node.value)
         value = getattr(owner, node.attr, None)
         if isinstance(value, float | int):
             # Infinities and NaN have no literal, and are the same in both precisions.
@@ -105,10 +107,10 @@ class _Rewriter(ast.NodeTransformer):
         self.found[name] = known
         return _name(name, node)
 
-    def _meaning(self, node: ast.AST) -> Any:
+    def meaning(self, node: ast.AST) -> Any:
         """What a dotted name stands for outside the law, or None."""
         if isinstance(node, ast.Attribute):
-            return getattr(self._meaning(node.value), node.attr, None)
+            return getattr(self.meaning(node.value), node.attr, None)
         return self.scope.get(node.id) if isinstance(node, ast.Name) else None
 
     def visit_arguments(self, node: ast.arguments) -> ast.AST:
@@ -159,7 +161,7 @@ def translate(
     scope = {**func.__globals__, **{name: cell.cell_contents for name, cell in cells.items()}}
     tree = definition(inspect.getsource(func) if source is None else source)
     rewriter = _Rewriter(precision, scope, resolve)
-    tree = rewriter.visit(tree)
+    tree = rewriter.visit(derivable(tree, lambda node: rewriter.meaning(node) is wp.where))
     source = ast.unparse(tree)
     named = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
     names = func.__globals__.keys() & named - {func.__name__, *func.__code__.co_varnames}
@@ -168,7 +170,7 @@ def translate(
     extra = {
         "_float64": wp.float64,
         **{f"_{k}_double": v for k, v in _DOUBLE.items()},
-        **{f"_{k}_derived": v for k, v in _EXTREMES.items()},
+        **{f"_{k}_derived": v for k, v in (_EXTREMES | _CHOICES).items()},
     }
     copy = types.FunctionType(
         func.__code__,

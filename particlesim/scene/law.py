@@ -218,7 +218,9 @@ def law(func: Callable[..., Any]) -> Law:
     and vectors that it names outside itself, read whenever a Simulation is made; a number that
     meets them is written ``2.0``, not ``2``. ``int`` parameters stay whole. A law may call other
     laws and Warp functions. A law of pairs that chooses by ``wp.where``, ``wp.max``, ``wp.min`` or
-    ``wp.clamp`` rather than by ``if`` runs on the CPU's vector units, its derivative too. What the
+    ``wp.clamp`` rather than by ``if`` runs on the CPU's vector units, its derivative too: that of
+    the branch that is taken, whatever the other would give, ``wp.where(r < 1.0, wp.sqrt(1.0 - r),
+    0.0)``; name what only a branch needs once, or write it in the branch. What the
     first parameters mean is up to who uses the law (see ``PairForce``, ``ParticleForce``,
     ``Constraint``); the others are given by keyword there.
 
