@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from .choices import derivable, passed, taken
 from .extremes import larger, smaller, within
 from .warp_internals import compiled, digest, is_after_gradients, named_function
 
@@ -28,9 +29,11 @@ _DOUBLE = {
     name: getattr(wp, f"{name}d")
     for name in ("vec2", "vec3", "vec4", "mat22", "mat33", "mat44", "quat")
 }
+_VECTORS = (*_DOUBLE.values(), *(getattr(wp, name) for name in _DOUBLE))
 _DOUBLE["float32"] = wp.float64
 # What laws call in place of Warp's own, so that their derivatives vectorise.
 _EXTREMES = {"max": larger, "min": smaller, "clamp": within}
+_CHOICES = {"taken": taken, "passed": passed}
 
 
 # Coincident particles part along this direction, or with its components' signs turned.
@@ -61,11 +64,16 @@ PRECISIONS = {"float32": FLOAT32, "float64": FLOAT64}
 class _Rewriter(ast.NodeTransformer):
     """Rewrites a law's numbers and Warp's short names for a precision.
 
-    Attributes that are numbers (``math.pi``) become literals, so that a law's source says all.
+    Attributes that are numbers (``math.pi``) become literals, and those that are functions or
+    vectors names of their own, in ``found``, so that the source and what it names say all.
     """
 
-    def __init__(self, precision: Precision, scope: dict[str, Any]):
-        self.double, self.scope = precision is FLOAT64, scope
+    def __init__(
+        self, precision: Precision, scope: dict[str, Any], resolve: Callable[[Any], Any]
+    ) -> None:
+        self.precision, self.scope, self.resolve = precision, scope, resolve
+        self.double = precision is FLOAT64
+        self.found: dict[str, Any] = {}
 
     def _number(self, node: ast.AST) -> ast.AST:
         if not self.double:
@@ -80,7 +88,7 @@ class _Rewriter(ast.NodeTransformer):
         return _name("_float64", node) if self.double and node.id == "float" else node
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
-        owner = self._meaning(node.value)
+        owner = self.meaning(node.value)
         value = getattr(owner, node.attr, None)
         if isinstance(value, float | int):
             # Infinities and NaN have no literal, and are the same in both precisions.
@@ -90,12 +98,19 @@ class _Rewriter(ast.NodeTransformer):
             return _name(f"_{node.attr}_double", node)
         if owner is wp and node.attr in _EXTREMES:
             return _name(f"_{node.attr}_derived", node)
-        return node if owner is not None else self.generic_visit(node)
+        if owner is None:
+            return self.generic_visit(node)
+        known = value if owner is wp else constant(self.resolve(value), self.precision)
+        if owner is wp or not isinstance(known, (wp.Function, *_VECTORS)):
+            return node
+        name = f"_{ast.unparse(node).replace('.', '_')}"
+        self.found[name] = known
+        return _name(name, node)
 
-    def _meaning(self, node: ast.AST) -> Any:
+    def meaning(self, node: ast.AST) -> Any:
         """What a dotted name stands for outside the law, or None."""
         if isinstance(node, ast.Attribute):
-            return getattr(self._meaning(node.value), node.attr, None)
+            return getattr(self.meaning(node.value), node.attr, None)
         return self.scope.get(node.id) if isinstance(node, ast.Name) else None
 
     def visit_arguments(self, node: ast.arguments) -> ast.AST:
@@ -133,22 +148,29 @@ def translate(
     func: Callable[..., Any],
     precision: Precision,
     resolve: Callable[[Any], Any] = lambda value: value,
+    source: str | None = None,
 ) -> wp.Function:
-    """Make a Warp function of ``func`` in ``precision``.
+    """Make a Warp function of ``func`` in ``precision``, with what it names as it is now.
 
     ``resolve`` maps global and closure values that the law refers to (other laws) to what the
-    Warp function should call. The native name is a hash of the source, so that native snippets
-    can call it by name and the kernel cache on disk is found again by the next process.
+    Warp function should call. The native name is a hash of the source and of those values, so that
+    native snippets can call it by name, the kernel cache on disk is found again by the next
+    process, and nothing is made twice. ``source`` is the function's, None: as it is in its file.
     """
     cells = dict(zip(func.__code__.co_freevars, func.__closure__ or (), strict=True))
     scope = {**func.__globals__, **{name: cell.cell_contents for name, cell in cells.items()}}
-    source = _rewritten(func, precision, scope)
-    names = func.__globals__.keys() & set(func.__code__.co_names) - {func.__name__}
+    tree = definition(inspect.getsource(func) if source is None else source)
+    rewriter = _Rewriter(precision, scope, resolve)
+    tree = rewriter.visit(derivable(tree, lambda node: rewriter.meaning(node) is wp.where))
+    source = ast.unparse(tree)
+    named = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    names = func.__globals__.keys() & named - {func.__name__, *func.__code__.co_varnames}
     used = {name: constant(resolve(scope[name]), precision) for name in [*sorted(names), *cells]}
+    used |= rewriter.found
     extra = {
         "_float64": wp.float64,
         **{f"_{k}_double": v for k, v in _DOUBLE.items()},
-        **{f"_{k}_derived": v for k, v in _EXTREMES.items()},
+        **{f"_{k}_derived": v for k, v in (_EXTREMES | _CHOICES).items()},
     }
     copy = types.FunctionType(
         func.__code__,
@@ -169,13 +191,12 @@ def translate(
     return named_function(copy, name, annotations=hints, source=source, after_gradients=derives)
 
 
-def _rewritten(func: Callable[..., Any], precision: Precision, scope: dict[str, Any]) -> str:
-    """The source of ``func`` in ``precision``, without decorators."""
-    tree = ast.parse(textwrap.dedent(inspect.getsource(func)))
-    definition = tree.body[0]
-    if isinstance(definition, ast.FunctionDef):
-        definition.decorator_list = []
-    return ast.unparse(_Rewriter(precision, scope).visit(tree))
+def definition(source: str) -> ast.Module:
+    """The syntax of a function's source, without decorators."""
+    tree = ast.parse(textwrap.dedent(source))
+    if isinstance(tree.body[0], ast.FunctionDef):
+        tree.body[0].decorator_list = []
+    return tree
 
 
 def function(func: Callable[..., Any], after_gradients: bool = False) -> wp.Function:

@@ -90,6 +90,32 @@ def written_in_python(value: Any) -> Callable[..., Any] | None:
     return None
 
 
+def returned_types(function: wp.Function) -> list[Any] | None:
+    """Types of what a function returns, found by generating its code; None: it is generic.
+
+    Rests on: ``type_is_generic``; ``Function.build`` without a builder, with the options of a
+    module; that it sets ``adj.return_var``, whose entries have a ``type``, and builds what the
+    function calls.
+
+    Raises:
+        Exception: Of many kinds, when the code cannot be generated (see :func:`failed_line`).
+    """
+    if any(wp._src.types.type_is_generic(kind) for kind in function.input_types.values()):
+        return None
+    function.build(None, wp.get_module(__name__).options)
+    return [each.type for each in function.adj.return_var or ()]
+
+
+def source_lines(function: wp.Function) -> list[str]:
+    """What Warp reads of a function. Rests on: ``adj.source_lines``."""
+    return function.adj.source_lines
+
+
+def failed_line(function: wp.Function) -> int:
+    """Which of them, from 1, no code could be generated of. Rests on: ``adj.lineno``."""
+    return (function.adj.lineno or 0) + 1
+
+
 def argument_names(function: wp.Function) -> tuple[str, ...]:
     """Names of a function's arguments. Rests on: ``Function.input_types``."""
     return tuple(function.input_types)

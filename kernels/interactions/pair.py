@@ -214,3 +214,18 @@ def sum_store(
         "Params": params, "Out": out, **_readers(fields, precision),
     }  # fmt: skip
     return function_from_source(source, namespace, after_gradients=True)
+
+
+@functools.cache
+def values_kernel(law: wp.Function, names: tuple[str, ...], params: Any) -> wp.Kernel:
+    """Kernel: a law of double precision at given arguments, those of these names in ``params``."""
+    call = ", ".join(f"p.{name}" for name in names)
+    source = f"def value(p: Params):\n    return law({call})\n"
+    value = function_from_source(source, {"law": law, "Params": params}, after_gradients=True)
+
+    @functools.partial(register, cpu_only=True)
+    def values_of_law(given: wp.array(dtype=params), out: wp.array(dtype=wp.float64)):
+        k = wp.tid()
+        out[k] = value(given[k])
+
+    return values_of_law

@@ -155,7 +155,8 @@ class Boundary(Holding):
         given = Params()
         for name, value in values.items():
             setattr(given, name, kinds[name](value))
-        kernel = kernels.distance_kernel(self.law.function(FLOAT64), tuple(kinds), Params)
+        law = self.law.function(FLOAT64, self.name, float)
+        kernel = kernels.distance_kernel(law, tuple(kinds), Params)
         found = wp.empty(len(x), dtype=wp.float64, device="cpu")
         places = wp.array(x, dtype=wp.vec3d, device="cpu")
         wp.launch(kernel, len(x), [given, places], [found], device="cpu")
@@ -246,5 +247,5 @@ class Boundary(Holding):
 
     def surface(self, precision: Precision) -> wp.Function:
         """Where it is, as a Warp function (see kernels.constraints.boundary_shapes)."""
-        law, names = self.law.function(precision), tuple(self.parameters)
-        return kernels.distance_function(law, names, precision, self.Params)
+        law = self.law.function(precision, self.name, float)
+        return kernels.distance_function(law, tuple(self.parameters), precision, self.Params)

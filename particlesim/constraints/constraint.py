@@ -170,8 +170,8 @@ class Constraint(ConstraintBase):
     def evaluation(self, model: Model, item: Any) -> wp.Function:
         """C and its gradient as a Warp function (see kernels.constraints)."""
         return kernels.derived_evaluation(
-            self.law.function(model.precision), self.particles.shape[1], tuple(self.parameters),
-            model.precision, item,
+            self.law.function(model.precision, self.name, float), self.particles.shape[1],
+            tuple(self.parameters), model.precision, item,
         )  # fmt: skip
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import warp as wp
 
 from .. import validate
+from ..scene.fingerprint import laws_of
 from ..scene.part import ConstraintBase, Interaction, Part
 from ..scene.scene import Scene
 from ..scene.settings import Settings
@@ -38,6 +39,7 @@ class Loop:
     ):
         self.scenes: Sequence[Scene] = list(scenes)
         self.settings = settings
+        self.laws = laws_of(scenes[0])  # as they are read now
         self.model = model = Model(scenes, settings, device)
         self.frame = 0
         self._distinct = list({id(scene): scene for scene in scenes}.values())

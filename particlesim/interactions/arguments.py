@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import warp as wp
 
 from .. import validate
 from ..scene.law import Law
 
 # Per-particle quantities that a law may name, beside the attributes of the scene.
 QUANTITIES = frozenset({"position", "velocity", "mass", "radius", "density"})
+VECTORS = frozenset({"position", "velocity"})  # among them
+NUMBERS = (float, wp.float32, inspect.Parameter.empty)  # as a law's parameters are written
+WIDTHS = {wp.vec2: 2, wp.vec3: 3, wp.vec4: 4}
 
 
 class Arguments:
@@ -65,7 +70,7 @@ class Arguments:
                 )
 
     def check(self, attributes: Mapping[str, Any]) -> None:
-        """All quantities exist in the scene."""
+        """All quantities exist in the scene, and are what the law takes them for."""
         for name in sorted(self.quantities):
             if name not in QUANTITIES and name not in attributes:
                 allowed = sorted({*QUANTITIES, *attributes} - {"pinned"})
@@ -74,6 +79,22 @@ class Arguments:
                     f"{', '.join(allowed)}, got nothing; pass {name}=... or "
                     f"add_particles(..., {name}=...)."
                 )
+        for parameter, (kind, name) in zip(self.names, self.sources, strict=True):
+            if kind.startswith("quantity"):
+                width = attributes.get(name, 3 if name in VECTORS else None)
+                if width is None or isinstance(width, int):
+                    self._check_type(parameter, width)
+
+    def _check_type(self, parameter: str, width: int | None) -> None:
+        """The parameter is of that width; None: a number."""
+        kind = self.law.parameters[parameter]
+        number, vector = kind in NUMBERS, WIDTHS.get(kind)
+        if (width is None and vector) or (width is not None and number):
+            wanted = "float" if width is None else f"wp.vec{width}"
+            raise validate.fail(
+                self.owner, f"law {self.law.name}", f"take {parameter} as {wanted}",
+                "float" if number else f"wp.vec{vector}", f"write {parameter}: {wanted}",
+            )  # fmt: skip
 
     def source(
         self,
@@ -103,6 +124,13 @@ class Arguments:
         """A parameter's value, checked: whole, a number or a vector."""
         if self.law.parameters[name] is int:
             return np.int32(validate.whole(self.owner, name, value, minimum=-(2**31)))
+        if self.law.parameters[name] is wp.vec3:
+            return validate.vector(self.owner, name, value)
         if np.ndim(value) == 0:
             return validate.number(self.owner, name, value)
+        if self.law.parameters[name] in NUMBERS:
+            raise validate.fail(
+                self.owner, name, f"be a number, as {self.law.name} takes it", value,
+                f"give one, or write {name}: wp.vec3 there",
+            )  # fmt: skip
         return validate.vector(self.owner, name, value)

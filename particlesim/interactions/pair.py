@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -20,6 +21,7 @@ from ..scene.law import Law
 from ..scene.law import law as make_law
 from ..scene.part import Interaction
 from .arguments import Arguments
+from .exchange import is_symmetric, named
 from .pair_limits import collisions
 from .pair_loop import PairLoop, check_names, squared_distances
 
@@ -92,6 +94,8 @@ class Pair(Interaction):
         self.model = model
         for each in self.arguments:
             each.check(model.attributes)
+        # Of the laws as they are now.
+        self.functions = [each.function(model.precision, self.name, float) for each in self.laws]
         self.pairs = neighbors.of(self, self.quantities)
         columns = self.columns(self.parameters)
         cutoff = None if self.cutoff is None else np.array([peer.cutoff for peer in self.peers])
@@ -104,6 +108,12 @@ class Pair(Interaction):
         self.loop = PairLoop.over(model, self.pairs, "Pair", fields, self.Params, self.params)
         self.term = self._term(kernels.force_term, -1, derivative=self.force is None)
 
+    @property
+    def reciprocal(self) -> bool:
+        """Whether i feels of j what j feels of i, as far as tries on some pairs tell."""
+        members = np.unique(self.pairs.members_host)
+        return all(is_symmetric(each, self.model, members, self.cutoff) for each in self.arguments)
+
     def fields_of(self, pairs: AllPairs) -> dict[str, wp.array]:
         """What the term reads, in the order of a list's slots."""
         own = {name: pairs.fields[name] for name in self.quantities if name != "position"}
@@ -113,8 +123,8 @@ class Pair(Interaction):
         """A term of the k-th law."""
         precision = self.model.precision
         arguments = self.arguments[k].source({"_i": "i", "_j": "j"})
-        law = self.laws[k].function(precision)
-        return make(law, arguments, precision, self.loop.Data, self.Params, **options)
+        law, Data = self.functions[k], self.loop.Data
+        return make(law, arguments, precision, Data, self.Params, **options)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         self.loop.sum(self.term, kernels.add_force, {"f": state.force}, 3)
@@ -137,7 +147,11 @@ class PairPotential(Pair):
         group: Which particles interact with each other; None: all.
         cutoff: Distance beyond which there is no force [length]; None: all pairs of a world.
         **parameters: The law's further parameters; those not given are quantities of the two
-            particles (``charge_i``, ``mass_j``).
+            particles (``charge_i``, ``mass_j``), which the law must treat alike.
+
+    Raises:
+        ValueError: When a simulation is made, of a law that is another with i and j exchanged: it
+            would break Newton's third law, and keep neither momentum nor energy.
 
     Example:
         >>> @law
@@ -150,11 +164,23 @@ class PairPotential(Pair):
     def __init__(self, law: Any, group: Any = None, *, cutoff: float | None, **parameters: Any):
         super().__init__(make_law(law), None, group, cutoff, parameters)
 
+    def attach(self, model: Model, state: State) -> None:
+        super().attach(model, state)
+        if not self.reciprocal:
+            raise validate.fail(
+                self.name, f"law {self.laws[0].name}", "be the same with i and j exchanged",
+                ", ".join(named(self.arguments[0])),
+                "name each quantity of both particles and treat them alike, as in mass_i * mass_j; "
+                "a PairForce may differ",
+            )  # fmt: skip
+
 
 class PairForce(Pair):
     """Pair force F(r) along the pair, given directly; positive repels.
 
-    Arguments as for :class:`PairPotential`. No energy is reported.
+    Arguments as for :class:`PairPotential`. No energy is reported. A law that is another with i and
+    j exchanged, as ``charge_i * mass_j`` is, gives forces that are not opposite: i feels F of (i,
+    j), j feels F of (j, i), and momentum is not kept. A warning says so, once for each law.
 
     Example:
         >>> @law
@@ -166,3 +192,19 @@ class PairForce(Pair):
 
     def __init__(self, law: Any, group: Any = None, *, cutoff: float | None, **parameters: Any):
         super().__init__(None, make_law(law), group, cutoff, parameters)
+
+    def attach(self, model: Model, state: State) -> None:
+        super().attach(model, state)
+        law = self.laws[0]
+        if law.content not in _WARNED and not self.reciprocal:
+            _WARNED.add(law.content)
+            names = ", ".join(named(self.arguments[0]))
+            warnings.warn(
+                f"{self.name}: law {law.name} is another with i and j exchanged ({names}): forces "
+                "are not opposite, and momentum is not kept. Name each quantity of both particles "
+                "and treat them alike if that is not meant.",
+                stacklevel=2,
+            )
+
+
+_WARNED: set[str] = set()  # contents of laws

@@ -14,6 +14,7 @@ from .. import validate
 from ..engine.model import Model
 from ..engine.neighbors.lists import Neighbors
 from ..kernels.interactions import pair as kernels
+from ..scene.law import Law
 from ..scene.law import law as make_law
 from ..scene.part import Interaction
 from .arguments import Arguments
@@ -98,6 +99,11 @@ class PairSum:
         self.of_pair = self._bound(law, ("_i", "_j"), PAIR, earlier)
         self.of_one = None if then is None else self._bound(then, ("",), ("total",), earlier)
         self.last = self.of_one or self.of_pair
+        bound = {self.of_pair, self.last}
+        self.functions = {
+            each: each.law.function(model.precision, self.name, _returned(each.law))
+            for each in bound
+        }
         self.kept = self._checked(earlier)
         self.names = (self.of_pair.quantities | self.last.quantities) - self.kept.keys()
         part.requires = part.requires | self.names
@@ -189,7 +195,12 @@ class PairSum:
         self, bound: Arguments, index: Mapping[str, str], extra: Mapping[str, str]
     ) -> tuple[wp.Function, list[str]]:
         """A law's function, and the source of its arguments."""
-        return bound.law.function(self.model.precision), bound.source(index, extra, READ)
+        return self.functions[bound], bound.source(index, extra, READ)
+
+
+def _returned(law: Law) -> Any:
+    """What a law says that it returns; a number where it says nothing."""
+    return float if law.returns is inspect.Signature.empty else law.returns
 
 
 def _parameters(part: Interaction) -> dict[str, Any]:

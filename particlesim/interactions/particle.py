@@ -97,6 +97,12 @@ class ParticleForce(Interaction):
         self.model = model
         for each in self.arguments:
             each.check(model.attributes)
+        # Of the laws as they are now.
+        self.functions = [
+            each.function(model.precision, self.name, kind)
+            for each, kind in ((self.law, wp.vec3), (self.potential, float))
+            if each is not None
+        ]
         members = model.members([peer.group for peer in self.peers], self.name)
         self.count = len(members)
         self.members = model.array(members, wp.int32)
@@ -112,18 +118,18 @@ class ParticleForce(Interaction):
             fields["time"] = state.time
         self.Data = structure_of("ParticleData", fields)
         self.data = filled(self.Data, fields)
-        own = self.arguments[0]
-        derived = own.names.index("position") if self.law is None else None
-        self.kernel = kernels.force_kernel(*self._called(own), derived, *self._types)
+        names = self.arguments[0].names
+        derived = names.index("position") if self.law is None else None
+        self.kernel = kernels.force_kernel(*self._called(0), derived, *self._types)
 
     @property
     def _types(self) -> tuple[Any, Any, Any]:
         return self.model.precision, self.Data, self.Params
 
-    def _called(self, arguments: Arguments) -> tuple[wp.Function, tuple[str, ...]]:
-        """A law's function, and the source of its arguments."""
-        source = arguments.source({"": "i"}, {"time": "real(d.time[w])"})
-        return arguments.law.function(self.model.precision), tuple(source)
+    def _called(self, k: int) -> tuple[wp.Function, tuple[str, ...]]:
+        """The k-th law's function, and the source of its arguments."""
+        source = self.arguments[k].source({"": "i"}, {"time": "real(d.time[w])"})
+        return self.functions[k], tuple(source)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         self._launch(self.kernel, state.force)
@@ -134,8 +140,8 @@ class ParticleForce(Interaction):
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         if self.potential is not None:
-            called = self._called(self.arguments[-1])
-            self._launch(kernels.energy_kernel(*called, *self._types), energy)
+            kernel = kernels.energy_kernel(*self._called(-1), *self._types)
+            self._launch(kernel, energy)
 
 
 @law

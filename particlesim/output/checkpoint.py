@@ -75,7 +75,7 @@ def capture(
         "incidents": [dataclasses.asdict(incident) for incident in watchdog.incidents],
         "settings": loop.settings.plain,
         "copies": all(scene is loop.scenes[0] for scene in loop.scenes),
-        "scenes": fingerprint(loop.scenes) if scenes is None else scenes,
+        "scenes": fingerprint(loop.scenes, loop.laws) if scenes is None else scenes,
         "arrays": list(arrays),
     }
     return Capture(header, arrays)

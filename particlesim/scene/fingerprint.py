@@ -1,8 +1,9 @@
 """Fingerprints: what of a scene gives the arrays of its simulation their meaning.
 
 Particles, groups, attributes, the periodic box, and of every interaction and constraint its kind,
-its particles, its tuples and the shapes of its parameters. Values are left out: positions and
-velocities come with the arrays, and a stiffness may change from one part of a run to the next.
+its particles, its tuples and the shapes of its parameters, and of every law what it says. Values
+are left out: positions and velocities come with the arrays, and a stiffness may change from one
+part of a run to the next.
 :func:`values` has them, for runs that are to go on to the same bits.
 """
 
@@ -12,7 +13,8 @@ import dataclasses
 import inspect
 import re
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from inspect import isfunction
 from types import CodeType
 from typing import Any
 
@@ -20,17 +22,18 @@ import numpy as np
 import warp as wp
 
 from .group import Group, select
-from .law import Law
+from .law import Key, Law, law
 from .part import Part
 from .scene import Scene
 
 ABSENT = "nothing"
 
 
-def fingerprint(scenes: Sequence[Scene]) -> dict[str, Any]:
+def fingerprint(scenes: Sequence[Scene], laws: dict[str, str] | None = None) -> dict[str, Any]:
     """What must agree, as plain lists, dicts, texts and numbers (JSON).
 
-    Worlds that are alike are described once: world w is ``kinds[worlds[w]]``.
+    Worlds that are alike are described once: world w is ``kinds[worlds[w]]``. Their laws are the
+    same: as :func:`laws_of` had them when a simulation read them, None: as they are now.
     """
     kinds: list[dict[str, Any]] = []
     of_scene: dict[int, int] = {}
@@ -40,11 +43,41 @@ def fingerprint(scenes: Sequence[Scene]) -> dict[str, Any]:
             if described not in kinds:
                 kinds.append(described)
             of_scene[id(scene)] = kinds.index(described)
-    return {"kinds": kinds, "worlds": [of_scene[id(scene)] for scene in scenes]}
+    return {
+        "kinds": kinds,
+        "worlds": [of_scene[id(scene)] for scene in scenes],
+        "laws": laws_of(scenes[0]) if laws is None else laws,
+    }
+
+
+def laws_of(scene: Scene) -> dict[str, str]:
+    """By place, what the laws of a scene say with all that they name; not the package's own."""
+    found = {}
+    for what in ("interactions", "constraints"):
+        for k, part in enumerate(getattr(scene, what)):
+            for key in _keys(part.kind()):
+                if key.module.partition(".")[0] != __name__.partition(".")[0]:
+                    where = f"{what}[{k}].law {key.signature.partition('(')[0]}"
+                    found[where] = f"source with what it names, checksum {key.content}"
+    return found
+
+
+def _keys(kind: Any) -> Iterator[Key]:
+    """The laws of a kind."""
+    if isinstance(kind, tuple | list):
+        for each in kind:
+            yield from _keys(each)
+    elif isinstance(kind, Key):
+        yield kind
+    elif isfunction(kind):
+        yield law(kind).key
 
 
 def difference(saved: dict[str, Any], given: dict[str, Any]) -> tuple[str, Any, Any] | None:
-    """The first place where two fingerprints differ, and what each has there; None: nowhere."""
+    """The first place where two fingerprints differ, and what each has there; None: nowhere.
+
+    Those of older checkpoints do not know their laws.
+    """
     if len(saved["worlds"]) != len(given["worlds"]):
         return "worlds", len(saved["worlds"]), len(given["worlds"])
     seen = set()
@@ -55,7 +88,7 @@ def difference(saved: dict[str, Any], given: dict[str, Any]) -> tuple[str, Any, 
             found = first_change(where, saved["kinds"][ours], given["kinds"][theirs])
             if found:
                 return found
-    return None
+    return first_change("scene", saved.get("laws", given["laws"]), given["laws"])
 
 
 def values(scenes: Sequence[Scene]) -> list[dict[str, Any]]:
@@ -182,8 +215,8 @@ def _plain(value: Any) -> Any:
         return [_plain(each) for each in value]
     if isinstance(value, type):
         return value.__name__
-    if isinstance(value, CodeType):
-        return _signature(value.co_name, value)
+    if isinstance(value, Key):
+        return [value.signature, *(_plain(each) for each in value.closure)]
     if isinstance(value, Law):
         value = value.func
     if isinstance(value, wp.Function):

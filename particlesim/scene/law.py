@@ -6,14 +6,17 @@ import ast
 import functools
 import inspect
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from .. import validate
-from ..kernels.precision import Precision, translate
-from ..kernels.warp_internals import written_in_python
+from ..kernels.precision import Precision, definition, translate
+from ..kernels.warp_internals import digest, written_in_python
+from .law_errors import check
 
 UNROLLED = 16  # rounds up to which Warp writes a loop out
 
@@ -27,7 +30,8 @@ class Law:
     def __init__(self, func: Callable[..., Any]):
         functools.update_wrapper(self, func)
         self.func = func
-        if func.__name__ == "<lambda>" or not _has_source(func):
+        self.source = _source(func)  # as it is now: files and notebooks go on being written
+        if func.__name__ == "<lambda>" or not self.source:
             raise TypeError(
                 f"law: func must be a def in a file or notebook, got {func!r}; Warp reads its "
                 "source."
@@ -45,7 +49,7 @@ class Law:
             self.parameters[name] = parameter.annotation
             if parameter.default is not parameter.empty:
                 self.defaults[name] = parameter.default
-        self._functions: dict[str, wp.Function] = {}
+        self._functions: dict[tuple[str, str, Any], wp.Function] = {}
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         return self.func(*args, **kwargs)
@@ -56,13 +60,45 @@ class Law:
         return self.func.__name__
 
     @property
-    def key(self) -> tuple[Any, ...]:
-        """The same for laws of the same code and closure, each made anew as they may be."""
+    def key(self) -> Key:
+        """The same for laws of the same content, each made anew as they may be."""
         cells = [cell.cell_contents for cell in self.func.__closure__ or ()]
-        return (
-            self.func.__code__,
-            *(value.key if isinstance(value, Law) else repr(value) for value in cells),
-        )
+        known = (value.key if isinstance(value, Law) else repr(value) for value in cells)
+        signature = f"{self.name}({', '.join(self.parameters)})"
+        return Key(self.content, signature, tuple(known), self.func.__module__)
+
+    @property
+    def content(self) -> str:
+        """Hash of the source and of what it names at present, other laws with theirs."""
+        values = (f"{name} {_content(value, self)}" for name, value in self._named())
+        return digest(self._text, self.func.__defaults__, *self.parameters.values(), *values)
+
+    @functools.cached_property
+    def _text(self) -> str:
+        """The source without decorators, comments and line breaks."""
+        return ast.unparse(definition(self.source))
+
+    @functools.cached_property
+    def _names(self) -> list[tuple[str, ...]]:
+        """Names and dotted names of the body, of which some are the law's own."""
+        found = set()
+        for statement in definition(self.source).body[0].body:
+            for node in ast.walk(statement):
+                if isinstance(node, ast.Name | ast.Attribute):
+                    text = ast.unparse(node)
+                    if text.replace(".", "").isidentifier():
+                        found.add(tuple(text.split(".")))
+        return sorted(found)
+
+    def _named(self) -> Iterator[tuple[str, Any]]:
+        """What the law names outside itself, and what that stands for."""
+        scope = _scope(self.func)
+        for first, *rest in self._names:
+            if first in scope and first not in self.func.__code__.co_varnames:
+                value = functools.reduce(
+                    lambda each, name: getattr(each, name, None), rest, scope[first]
+                )
+                yield ".".join([first, *rest]), value
 
     def check_derivable(self, owner: str) -> None:
         """Refuse loops that Warp does not write out: it derives them wrongly, and silently.
@@ -71,7 +107,7 @@ class Law:
             ValueError: A ``while``, or a ``for`` whose rounds are not known in advance or over 16.
         """
         scope = _scope(self.func)
-        for node in ast.walk(ast.parse(textwrap.dedent(inspect.getsource(self.func)))):
+        for node in ast.walk(definition(self.source)):
             if isinstance(node, ast.While | ast.For) and not _is_unrolled(node, self.func, scope):
                 raise validate.fail(
                     owner, f"law {self.name}",
@@ -83,19 +119,53 @@ class Law:
             if isinstance(helper, Law) and helper.func is not self.func:
                 helper.check_derivable(owner)
 
-    def function(self, precision: Precision) -> wp.Function:
-        """The Warp function in ``precision``, translated on first use."""
-        if precision.name not in self._functions:
-            self._functions[precision.name] = translate(
-                self.func, precision, lambda value: _helper(value, precision)
-            )
-        return self._functions[precision.name]
+    def function(
+        self, precision: Precision, owner: str = "law", returns: Any = None
+    ) -> wp.Function:
+        """The Warp function in ``precision``, of what the law names at present.
+
+        Args:
+            precision: Its floats and vectors are of it.
+            owner: For errors, whoever uses the law.
+            returns: What it must return, float or a vector type; None: anything.
+
+        Raises:
+            ValueError: Warp cannot compile it, or it returns something else.
+        """
+        key = precision.name, self.content, returns
+        if key not in self._functions:
+
+            def helper(value: Any) -> Any:
+                value = _as_law(value)
+                return value.function(precision, owner) if isinstance(value, Law) else value
+
+            made = translate(self.func, precision, helper, self.source)
+            check(owner, self.source, made, precision, returns)
+            self._functions[key] = made
+        return self._functions[key]
 
 
-def _helper(value: Any, precision: Precision) -> Any:
-    """What a law that names ``value`` calls in ``precision``."""
+@dataclass(frozen=True)
+class Key:
+    """What makes a law that law: its content. The rest describes it (see ``fingerprint``)."""
+
+    content: str
+    signature: str = field(compare=False)
+    closure: tuple[Any, ...] = field(compare=False)
+    module: str = field(compare=False)
+
+
+def _content(value: Any, owner: Law) -> str:
+    """What a value that a law names is, the same in every process; other objects by their type."""
     value = _as_law(value)
-    return value.function(precision) if isinstance(value, Law) else value
+    if isinstance(value, Law):
+        return "itself" if value.func is owner.func else value.content
+    if isinstance(value, wp.Function | type):
+        return digest(value)
+    known = isinstance(value, int | float | str | tuple | np.generic)
+    return (
+        repr(value) if known or type(value).__module__.startswith("warp") else type(value).__name__
+    )
 
 
 def _as_law(value: Any) -> Any:
@@ -126,11 +196,12 @@ def _is_unrolled(node: ast.While | ast.For, func: Callable[..., Any], scope: dic
     return not breaks and len(range(*bounds)) <= UNROLLED
 
 
-def _has_source(func: Callable[..., Any]) -> bool:
+def _source(func: Callable[..., Any]) -> str:
+    """Its text, empty where there is none."""
     try:
-        return bool(inspect.getsource(func))
+        return textwrap.dedent(inspect.getsource(func))
     except (OSError, TypeError):
-        return False
+        return ""
 
 
 @functools.cache
@@ -144,12 +215,14 @@ def law(func: Callable[..., Any]) -> Law:
 
     The body is Warp's subset of Python (``wp.sqrt``, ``wp.length``, branches, loops). Float
     literals, ``float`` and ``wp.vec3`` take the precision of the simulation, and so do the numbers
-    and vectors that it names outside itself; a number that meets them is written ``2.0``, not
-    ``2``. ``int`` parameters stay whole. A law may call other laws and Warp functions. A law of
-    pairs that chooses by ``wp.where``, ``wp.max``, ``wp.min`` or ``wp.clamp`` rather than by ``if``
-    runs on the CPU's vector units, its derivative too. What the first parameters mean is up to who
-    uses the law (see ``PairForce``, ``ParticleForce``, ``Constraint``); the others are given by
-    keyword there.
+    and vectors that it names outside itself, read whenever a Simulation is made; a number that
+    meets them is written ``2.0``, not ``2``. ``int`` parameters stay whole. A law may call other
+    laws and Warp functions. A law of pairs that chooses by ``wp.where``, ``wp.max``, ``wp.min`` or
+    ``wp.clamp`` rather than by ``if`` runs on the CPU's vector units, its derivative too: that of
+    the branch that is taken, whatever the other would give, ``wp.where(r < 1.0, wp.sqrt(1.0 - r),
+    0.0)``; name what only a branch needs once, or write it in the branch. What the
+    first parameters mean is up to who uses the law (see ``PairForce``, ``ParticleForce``,
+    ``Constraint``); the others are given by keyword there.
 
     Example:
         >>> @law

@@ -47,7 +47,7 @@ class Checkpoints:
         self.sim, self.output, self.every = sim, output, every
         self.path = checkpoint_path(output)
         self.first = sim.frame
-        self._scenes = fingerprint(sim.scenes)
+        self._scenes = fingerprint(sim.scenes, sim.loop.laws)
         self._arguments = _plain(
             {
                 "settings": {

@@ -96,10 +96,10 @@ def test_mie_has_its_well(exponents, device, simulate):
 def test_parameters_override_quantities(precision, device, force_of):
     scene = ps.Scene()
     scene.add_particles([(0, 0, 0), (2, 0, 0)], charge=[1.0, 3.0])
-    scene.add_interaction(ps.PairPotential(screened, cutoff=None, screening=1e6, charge_j=5.0))
-    # u = q_i 5 exp(-r/s)/r: what i feels depends on its own charge; exp(-2e-6) is 1 - 2e-6.
+    scene.add_interaction(ps.PairForce(screened, cutoff=None, screening=1e6, charge_j=5.0))
+    # F = q_i 5 exp(-r/s)/r: what i feels depends on its own charge; exp(-2e-6) is 1 - 2e-6.
     force = force_of(scene, precision, device)[:, 0]
-    np.testing.assert_allclose(force, [-5 / 4, 15 / 4], rtol=1e-5)
+    np.testing.assert_allclose(force, [-5 / 2, 15 / 2], rtol=1e-5)
 
 
 def test_a_law_may_ask_for_the_cutoff(device, simulate):

@@ -172,3 +172,25 @@ def test_names_are_the_same_in_every_process():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
     )
     assert done.stdout.split() == here
+
+
+def fails(x: float):
+    y = 2.0 * x
+    return wp.no_such_function(y)
+
+
+def two(x: float, v: wp.vec3):
+    return x, v
+
+
+def test_code_is_generated_to_find_what_is_returned_and_what_is_wrong():
+    assert internals.returned_types(SQUARE) == [wp.float64]
+    found = internals.returned_types(translate(two, FLOAT32))
+    assert [internals.digest(each) for each in found] == [
+        internals.digest(each) for each in (wp.float32, wp.vec3)
+    ]
+    made = translate(fails, FLOAT32)
+    with pytest.raises(AttributeError, match="no_such_function"):
+        internals.returned_types(made)
+    line = internals.source_lines(made)[internals.failed_line(made) - 1]
+    assert line.strip() == "return wp.no_such_function(y)"

@@ -186,13 +186,14 @@ class SPH(Interaction):
     def _laws(self) -> dict[str, wp.Function]:
         """The parts' laws as functions of their variables and the fluid's parameters."""
         precision = self.model.precision
-        laws = self.equation_of_state.laws | (self.viscosity.laws if self.viscosity else {})
+        parts = [self.equation_of_state, *([self.viscosity] if self.viscosity else [])]
         return {
             name: kernels.bound_law(
-                name, law.function(precision), VARIABLES[name], self.sources[name], precision,
-                self.Params,
+                name, law.function(precision, part.name, float), VARIABLES[name],
+                self.sources[name], precision, self.Params,
             )
-            for name, law in laws.items()
+            for part in parts
+            for name, law in part.laws.items()
         }  # fmt: skip
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
