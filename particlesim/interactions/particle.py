@@ -26,6 +26,11 @@ class ParticleForce(Interaction):
     A potential is enough: without a law of the force it is f = -dU/dx, derived by ``wp.grad``
     inside the kernel.
 
+    In a periodic box the force repeats with it: laws take the position in the box. The energy
+    is what has been climbed: with every crossing of an axis it changes by what the potential
+    rises across the box, so that of a uniform force it is -f.x at the unwrapped position. It is
+    conserved where the potential is a sum of one for each axis, or the same on opposite sides.
+
     Args:
         law: Returns the force, ``wp.vec3``; None: it is derived from ``potential``. Its parameters
             are, by name, the particle's ``position``, ``velocity``, ``mass``, ``radius`` or an
@@ -110,6 +115,9 @@ class ParticleForce(Interaction):
         fields |= {name: state[name] for name in sorted(self.quantities - {"position"})}
         if "time" in self.requires:
             fields["time"] = state.time
+        self.repeated = bool(model.periodic) and "position" in self.quantities
+        if self.repeated:
+            fields["image"] = state.image
         self.Data = structure_of("ParticleData", fields)
         self.data = filled(self.Data, fields)
         own = self.arguments[0]
@@ -123,19 +131,20 @@ class ParticleForce(Interaction):
     def _called(self, arguments: Arguments) -> tuple[wp.Function, tuple[str, ...]]:
         """A law's function, and the source of its arguments."""
         source = arguments.source({"": "i"}, {"time": "real(d.time[w])"})
-        return arguments.law.function(self.model.precision), tuple(source)
+        at = {"d.x[i]": "x"}  # which may be another place
+        law = arguments.law.function(self.model.precision)
+        return law, tuple(at.get(each, each) for each in source)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        self._launch(self.kernel, state.force)
-
-    def _launch(self, kernel: wp.Kernel, array: wp.array) -> None:
-        inputs = [self.members, self.world, self.params, self.data, array]
-        launch(kernel, self.count, inputs, self.model.device)
+        inputs = [self.members, self.world, self.params, self.data, state.force]
+        launch(self.kernel, self.count, inputs, self.model.device)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         if self.potential is not None:
             called = self._called(self.arguments[-1])
-            self._launch(kernels.energy_kernel(*called, *self._types), energy)
+            kernel = kernels.energy_kernel(*called, *self._types, self.repeated)
+            inputs = [self.members, self.world, self.params, self.model.box, self.data, energy]
+            launch(kernel, self.count, inputs, self.model.device)
 
 
 @law
