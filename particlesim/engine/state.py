@@ -107,6 +107,13 @@ class State:
             raise AttributeError(name)
         return self[name]
 
+    def unwrapped(self) -> np.ndarray:
+        """Positions as without periodic boxes, x + n L with the image n, (n, 3) float64."""
+        x = self["position"].numpy().astype(np.float64)
+        if "image" in self.arrays:
+            x += self["image"].numpy() * self._model.box_length[self._model.world_of]
+        return x
+
     def __contains__(self, name: str) -> bool:
         return name in self.arrays
 
