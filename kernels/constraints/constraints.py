@@ -142,13 +142,14 @@ def view_function(law: Solved) -> wp.Function:
     """``view(r, box, t, b) -> (x, e, X, C, G)``: tuple r as it is now.
 
     Its positions, what rounding has kept from them, what the evaluation sees of both, in one piece
-    of a periodic box, and what it makes of it. Seen from the first particle, together with what
-    rounding has kept, a distance is far from the origin as exact as near to it.
+    of a periodic box, each the image next to the one before it, and what it makes of it. Seen from
+    the first particle, together with what rounding has kept, a distance is far from the origin as
+    exact as near to it.
     """
     _real, Box, Tuples, Bodies = law.types
     evaluate, size, relative, compensated = law.evaluate, law.size, law.relative, law.compensated
     positions, wraps = positions_type(law.precision, size), bool(law.periodic)
-    image = minimum_image(law.precision, law.periodic)
+    vec3, image = law.precision.vec3, minimum_image(law.precision, law.periodic)
 
     def view(r: int, box: wp.array(dtype=Box), t: Tuples, b: Bodies):
         ids = t.particle[r]
@@ -160,16 +161,15 @@ def view_function(law: Solved) -> wp.Function:
                 e[a] = b.x_error[ids[a]]
         X = x
         if wp.static(relative or wraps):
-            for a in range(wp.static(size)):
-                d = x[a] - x[0]
+            if wp.static(relative):
+                X[0] = vec3()
+            for a in range(1, wp.static(size)):
+                d = x[a] - x[a - 1]
                 if wp.static(wraps):
                     d = image(d, box[t.world[r]])
-                if wp.static(relative):
-                    if wp.static(compensated):
-                        d = d + (e[a] - e[0])
-                    X[a] = d
-                else:
-                    X[a] = x[0] + d
+                if wp.static(relative and compensated):
+                    d = d + (e[a] - e[a - 1])
+                X[a] = X[a - 1] + d
         C, G = evaluate(X, t.item[r])
         return x, e, X, C, G
 

@@ -45,11 +45,9 @@ def compensated_sum(precision: Precision) -> wp.Function:
 
 
 def motion_functions(
-    precision: Precision, forces: bool, compensated: bool, remember: bool
-) -> tuple[wp.Function, wp.Function, wp.Function]:
-    """``kick(i, dt, m) -> v``: v += w f dt; ``move(i, dx, m)``: x += dx; and ``wrap(i, m)``: a
-    particle that has left the periodic box comes back in on the other side.
-    """
+    precision: Precision, forces: bool, compensated: bool
+) -> tuple[wp.Function, wp.Function]:
+    """``kick(i, dt, m) -> v``: v += w f dt; and ``move(i, dx, m)``: x += dx."""
     vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
     add = compensated_sum(precision)
 
@@ -74,10 +72,19 @@ def motion_functions(
             x = x + dx
         m.x[i] = x
 
-    move = function(move_by)
+    return function(kick), function(move_by)
+
+
+def wrap_function(
+    move: wp.Function, precision: Precision, compensated: bool, remember: bool
+) -> wp.Function:
+    """``wrap(i, m)``: a particle that has left the periodic box comes in on the other side.
+
+    After that lower <= x < lower + L, also where sums round.
+    """
+    vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
 
     def wrap(i: int, m: Motion):
-        # One box length at most: a substep that crosses a whole box is past any stability limit.
         b = m.box[m.world[i]]
         x = m.x[i]
         shift = vec3()
@@ -85,15 +92,34 @@ def motion_functions(
         for a in range(3):
             if b.length[a] > real(0.0):
                 n = int(wp.floor((x[a] - b.lower[a]) * b.inverse[a]))
+                if n == 0 and x[a] >= b.lower[a] + b.length[a]:  # the product was rounded
+                    n = 1
+                elif n == 0 and x[a] < b.lower[a]:
+                    n = -1
                 crossed[a] = n
                 shift[a] = -real(n) * b.length[a]
-        if wp.length_sq(shift) > real(0.0):
+        if crossed[0] != 0 or crossed[1] != 0 or crossed[2] != 0:
+            if wp.static(compensated):
+                error = m.x_error[i]
             move(i, shift, m)
+            y = vec3(m.x[i])
+            # What was rounded to the upper corner, or below the lower, comes to the lower.
+            for a in range(3):
+                high = y[a] >= b.lower[a] + b.length[a]
+                if b.length[a] > real(0.0) and (high or y[a] < b.lower[a]):
+                    if high:
+                        crossed[a] += 1
+                        shift[a] = -real(crossed[a]) * b.length[a]
+                    y[a] = b.lower[a]
+                    if wp.static(compensated):
+                        rest = (x[a] + shift[a]) - b.lower[a]
+                        m.x_error[i][a] = error[a] + rest
+            m.x[i] = y
             m.image[i] = m.image[i] + crossed
             if wp.static(remember):
                 m.x_previous[i] = m.x_previous[i] + shift
 
-    return function(kick), move, function(wrap)
+    return function(wrap)
 
 
 @functools.cache
@@ -107,7 +133,8 @@ def integration_kernels(
     remember: keep the positions at the start of the substep.
     """
     vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
-    kick, move, wrap = motion_functions(precision, forces, compensated, remember)
+    kick, move = motion_functions(precision, forces, compensated)
+    wrap = wrap_function(move, precision, compensated, remember)
     wraps = bool(periodic)
 
     @register

@@ -61,18 +61,22 @@ def box_type(precision: Precision) -> Any:
 
 
 def minimum_image(precision: Precision, periodic: Periodicity) -> wp.Function:
-    """d - L round(d / L) on the periodic axes."""
-    real, vec3, Box = precision.scalar, precision.vec3, box_type(precision)
+    """d - L round(d / L) on the periodic axes.
+
+    Rounding half to even is odd: two particles half a box apart see each other in opposite
+    directions.
+    """
+    vec3, Box = precision.vec3, box_type(precision)
     on_x, on_y, on_z = (int(axis) for axis in periodic)
 
     def nearest_image(d: vec3, box: Box):
         result = d
         if wp.static(on_x):
-            result[0] = d[0] - box.length[0] * wp.floor(d[0] * box.inverse[0] + real(0.5))
+            result[0] = d[0] - box.length[0] * wp.rint(d[0] * box.inverse[0])
         if wp.static(on_y):
-            result[1] = d[1] - box.length[1] * wp.floor(d[1] * box.inverse[1] + real(0.5))
+            result[1] = d[1] - box.length[1] * wp.rint(d[1] * box.inverse[1])
         if wp.static(on_z):
-            result[2] = d[2] - box.length[2] * wp.floor(d[2] * box.inverse[2] + real(0.5))
+            result[2] = d[2] - box.length[2] * wp.rint(d[2] * box.inverse[2])
         return result
 
     return function(nearest_image)
@@ -80,10 +84,9 @@ def minimum_image(precision: Precision, periodic: Periodicity) -> wp.Function:
 
 def native_image(precision: Precision, periodic: Periodicity) -> str:
     """The same in C++, of the numbers ``dx``, ``dy`` and ``dz`` and the struct ``box``."""
-    real = precision.c
-    floor = "__builtin_floorf" if real == "float" else "__builtin_floor"
+    rint = "__builtin_rintf" if precision.c == "float" else "__builtin_rint"
     return "\n".join(
-        f"d{axis} -= box.length[{n}] * {floor}(d{axis} * box.inverse[{n}] + ({real})0.5);"
+        f"d{axis} -= box.length[{n}] * {rint}(d{axis} * box.inverse[{n}]);"
         for n, (axis, on) in enumerate(zip("xyz", periodic, strict=True))
         if on
     )

@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from ..engine.loops import box_type
 from ..precision import Precision, function_from_source, register
 
 
@@ -12,15 +13,16 @@ def _evaluation(
     law: wp.Function, arguments: tuple[str, ...], precision: Precision, data: Any, params: Any,
     derived: int | None = None,
 ) -> wp.Function:  # fmt: skip
-    """The law of particle i, or minus its derivative by one of its arguments."""
+    """The law of particle i at x, or minus its derivative by one of its arguments."""
     call = f"({', '.join(arguments)})"
     lines = [f"return law{call}"]
     if derived is not None:
         gradients = ", ".join(f"g{k}" for k in range(len(arguments)))
         lines = [f"{gradients} = wp.grad(law){call}", f"return -g{derived}"]
-    source = "\n    ".join(["def law_of(i: int, w: int, d: Data, p: Params):", *lines, ""])
+    source = "\n    ".join(["def law_of(i: int, w: int, x: Vec3, d: Data, p: Params):", *lines, ""])
     namespace = {
-        "wp": wp, "law": law, "real": precision.scalar, "Data": data, "Params": params
+        "wp": wp, "law": law, "real": precision.scalar, "Vec3": precision.vec3, "Data": data,
+        "Params": params,
     }  # fmt: skip
     # Behind the adjoints that it, or the law, may call.
     return function_from_source(source, namespace, after_gradients=True)
@@ -46,16 +48,24 @@ def force_kernel(
         k = first + wp.tid()
         i = members[k]
         w = world[k]
-        f_io[i] = f_io[i] + evaluate(i, w, d, parameters[w])
+        f_io[i] = f_io[i] + evaluate(i, w, d.x[i], d, parameters[w])
 
     return particle_force
 
 
 @functools.cache
 def energy_kernel(
-    law: wp.Function, arguments: tuple[str, ...], precision: Precision, data: Any, params: Any
-) -> wp.Kernel:
-    """Kernel: energy += law(...) of each member."""
+    law: wp.Function, arguments: tuple[str, ...], precision: Precision, data: Any, params: Any,
+    repeated: bool,
+) -> wp.Kernel:  # fmt: skip
+    """Kernel: energy += law(...) of each member.
+
+    repeated: of the field that goes on in every image of the periodic box as in the box. Whoever
+    has crossed it n times along an axis has climbed what the law rises by from its lower to its
+    upper side as often; ``d`` holds the n as ``image``. For one linear in x that is the law at the
+    unwrapped position, for one that is the same on both sides nothing.
+    """
+    vec3, Box = precision.vec3, box_type(precision)
     evaluate = _evaluation(law, arguments, precision, data, params)
 
     @register
@@ -64,12 +74,25 @@ def energy_kernel(
         members: wp.array(dtype=wp.int32),
         world: wp.array(dtype=wp.int32),
         parameters: wp.array(dtype=params),
+        box: wp.array(dtype=Box),
         d: data,
         energy_io: wp.array(dtype=wp.float64),
     ):
         k = first + wp.tid()
         i = members[k]
         w = world[k]
-        energy_io[i] = energy_io[i] + wp.float64(evaluate(i, w, d, parameters[w]))
+        p = parameters[w]
+        energy = wp.float64(evaluate(i, w, d.x[i], d, p))
+        if wp.static(repeated):
+            for a in range(3):
+                n = d.image[i][a]
+                if n != 0:
+                    side = vec3(d.x[i])
+                    side[a] = box[w].lower[a]
+                    low = wp.float64(evaluate(i, w, side, d, p))
+                    side[a] = box[w].lower[a] + box[w].length[a]
+                    high = wp.float64(evaluate(i, w, side, d, p))
+                    energy += wp.float64(n) * (high - low)
+        energy_io[i] = energy_io[i] + energy
 
     return particle_energy

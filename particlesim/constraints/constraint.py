@@ -46,7 +46,8 @@ class Constraint(ConstraintBase):
 
     Args:
         law: ``C(x_0, ..., x_(k-1), ...)``: the first k parameters are the positions, ``wp.vec3``
-            (in a periodic scene the images next to x_0), the others are given by keyword.
+            (in a periodic scene each the image next to the one before it, so that neighbours in a
+            row must be within half a box), the others are given by keyword.
         particles: (m, k) indices, distinct within a row; (m,) for k = 1.
         compliance: alpha, the inverse of the stiffness [C / force], one or (m,), at least 0.
         damping: beta, force on C for its rate [force time / C], one or (m,), at least 0. Acts

@@ -28,7 +28,8 @@ class Distance(Constraint):
 
     Args:
         pairs: (m, 2) indices of the ends.
-        rest_length: L [length], one or (m,), at least 0; None: the distances at the start.
+        rest_length: L [length], one or (m,), at least 0, in a periodic scene at most half a box;
+            None: the distances at the start, there to the nearest image.
         compliance: alpha, the inverse of the stiffness [length / force], one or (m,), at least 0.
         damping: beta [force time / length], one or (m,), at least 0 (see :class:`Constraint`).
         inequality: Hold the distance to at least L: a strut that only pushes.
@@ -76,10 +77,9 @@ class Distance(Constraint):
         return (*super().kind(), self.tension_only)
 
     def columns(self, model: Model, w: int) -> dict[str, np.ndarray]:
-        result = super().columns(model, w)
-        if self.from_start:
-            result["rest_length"] = topology.distances(model, w, self.particles)
-        return result
+        given = None if self.from_start else self.parameters["rest_length"]
+        lengths = topology.rest_lengths(self.name, model, w, self.particles, given)
+        return {**super().columns(model, w), "rest_length": lengths}
 
     def evaluation(self, model: Model, item: Any) -> wp.Function:
         return distance_evaluation(-1 if self.tension_only else 1, model.precision, item)

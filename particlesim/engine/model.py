@@ -171,12 +171,20 @@ class Model:
             parts.append(part if part.shape == shape else np.zeros(shape))
         return np.concatenate(parts)
 
-    def wrapped(self, position: np.ndarray) -> np.ndarray:
-        """Positions moved into the periodic box of their world."""
-        length = self.box_length[self.world_of]
-        lower = self.box_lower[self.world_of]
-        inside = np.divide(position - lower, length, out=np.zeros_like(position), where=length > 0)
-        return position - length * np.floor(inside)
+    def wrapped(self, position: np.ndarray, world: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Positions moved into the periodic box of their world, lower <= x < lower + L, and images.
+
+        They are so in the precision of the kernels too: what would round to the upper corner comes
+        to the lower, which is the same place. The images, whole numbers n, say where from: x + n L.
+        """
+        real = self.precision.numpy
+        lower, length = self.box_lower[world], self.box_length[world]
+        upper = lower.astype(real) + length.astype(real)
+        boxes = np.divide(position - lower, length, out=np.zeros_like(position), where=length > 0)
+        image = np.floor(boxes)
+        image += (length > 0) & ((position - length * image).astype(real) >= upper)
+        inside = position - length * image
+        return np.where(length > 0, np.maximum(inside, lower), inside), image
 
     def members(self, groups: Sequence[Any], owner: str) -> np.ndarray:
         """Rows of the particles that each world's own ``group`` stands for, world by world."""

@@ -49,7 +49,7 @@ class State:
             if name in self.arrays:
                 continue
             if name == "image":
-                self.arrays[name] = wp.zeros(self.count, dtype=wp.vec3i, device=model.device)
+                self.arrays[name] = model.array(self.start(name), wp.vec3i)
             elif name == "world":
                 self.arrays[name] = model.array(model.world_of, wp.int32)
             elif name == "time":
@@ -81,8 +81,9 @@ class State:
         if name == "inverse_mass":
             pinned = model.column("pinned") > 0
             return np.where(pinned, 0.0, 1.0 / np.maximum(model.column("mass"), 1e-300))
-        if name == "position":
-            return model.wrapped(model.column(name))
+        if name in ("position", "image"):
+            x, image = model.wrapped(model.column("position"), model.world_of)
+            return x if name == "position" else image.astype(np.int32)
         if name in START or name in model.attributes:
             return model.column(name)
         return None
@@ -111,6 +112,13 @@ class State:
         if name.startswith("_") or name == "arrays":
             raise AttributeError(name)
         return self[name]
+
+    def unwrapped(self) -> np.ndarray:
+        """Positions as without periodic boxes, x + n L with the image n, (n, 3) float64."""
+        x = self["position"].numpy().astype(np.float64)
+        if "image" in self.arrays:
+            x += self["image"].numpy() * self._model.box_length[self._model.world_of]
+        return x
 
     def __contains__(self, name: str) -> bool:
         return name in self.arrays

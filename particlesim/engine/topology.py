@@ -93,8 +93,31 @@ def incidence(pairs: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
-def distances(model: Model, w: int, pairs: np.ndarray) -> np.ndarray:
-    """Distances of the pairs of world w at the start, (m,); to the nearest image."""
+def rest_lengths(
+    owner: str, model: Model, w: int, pairs: np.ndarray, given: np.ndarray | None
+) -> np.ndarray:
+    """Rest lengths of the pairs of world w, (m,): as given, or the distances at the start.
+
+    Distances are those to the nearest image, and along an axis none is further than half a box.
+
+    Raises:
+        ValueError: A length of more than half a box: turned along the axis its ends would see each
+            other on the wrong side.
+    """
+    result = _distances(model, w, pairs) if given is None else given
+    for axis, on in enumerate(model.periodic):
+        half = 0.5 * model.box_length[w, axis]
+        if on and len(result) and result.max() > half * (1 + 1e-9):
+            at = int(np.argmax(result))
+            raise validate.fail(
+                owner, f"rest_length[{at}]",
+                f"be at most half the periodic length along {'xyz'[axis]}, {half:g} [length]",
+                float(result[at]), "enlarge the box, or put particles between",
+            )  # fmt: skip
+    return result
+
+
+def _distances(model: Model, w: int, pairs: np.ndarray) -> np.ndarray:
     scene = model.scenes[w]
     d = scene.position[pairs[:, 1]] - scene.position[pairs[:, 0]]
     length = model.box_length[w]

@@ -26,6 +26,11 @@ class ParticleForce(Interaction):
     A potential is enough: without a law of the force it is f = -dU/dx, derived by ``wp.grad``
     inside the kernel.
 
+    In a periodic box the force repeats with it: laws take the position in the box. The energy
+    is what has been climbed: with every crossing of an axis it changes by what the potential
+    rises across the box, so that of a uniform force it is -f.x at the unwrapped position. It is
+    conserved where the potential is a sum of one for each axis, or the same on opposite sides.
+
     Args:
         law: Returns the force, ``wp.vec3``; None: it is derived from ``potential``. Its parameters
             are, by name, the particle's ``position``, ``velocity``, ``mass``, ``radius`` or an
@@ -116,6 +121,9 @@ class ParticleForce(Interaction):
         fields |= {name: state[name] for name in sorted(self.quantities - {"position"})}
         if "time" in self.requires:
             fields["time"] = state.time
+        self.repeated = bool(model.periodic) and "position" in self.quantities
+        if self.repeated:
+            fields["image"] = state.image
         self.Data = structure_of("ParticleData", fields)
         self.data = filled(self.Data, fields)
         names = self.arguments[0].names
@@ -129,19 +137,19 @@ class ParticleForce(Interaction):
     def _called(self, k: int) -> tuple[wp.Function, tuple[str, ...]]:
         """The k-th law's function, and the source of its arguments."""
         source = self.arguments[k].source({"": "i"}, {"time": "real(d.time[w])"})
-        return self.functions[k], tuple(source)
+        at = {"d.x[i]": "x"}  # which may be another place
+        return self.functions[k], tuple(at.get(each, each) for each in source)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        self._launch(self.kernel, state.force)
-
-    def _launch(self, kernel: wp.Kernel, array: wp.array) -> None:
-        inputs = [self.members, self.world, self.params, self.data, array]
-        launch(kernel, self.count, inputs, self.model.device)
+        inputs = [self.members, self.world, self.params, self.data, state.force]
+        launch(self.kernel, self.count, inputs, self.model.device)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         if self.potential is not None:
-            kernel = kernels.energy_kernel(*self._called(-1), *self._types)
-            self._launch(kernel, energy)
+            called = self._called(-1)
+            kernel = kernels.energy_kernel(*called, *self._types, self.repeated)
+            inputs = [self.members, self.world, self.params, self.model.box, self.data, energy]
+            launch(kernel, self.count, inputs, self.model.device)
 
 
 @law

@@ -24,7 +24,8 @@ class Springs(Interaction):
     Args:
         pairs: (m, 2) indices of the ends.
         stiffness: k [force/length], one or (m,), at least 0.
-        rest_length: L [length], one or (m,); None: the distances at the start.
+        rest_length: L [length], one or (m,), in a periodic scene at most half a box; None: the
+            distances at the start, there to the nearest image.
         damping: c [force time/length], one or (m,), at least 0.
 
     Raises:
@@ -57,7 +58,10 @@ class Springs(Interaction):
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
         pairs = topology.merged(self.name, "pairs", model, [peer.pairs for peer in self.peers])
-        lengths = [peer._lengths(model, w) for w, peer in enumerate(self.peers)]
+        lengths = [
+            topology.rest_lengths(self.name, model, w, peer.pairs, peer.rest_length)
+            for w, peer in enumerate(self.peers)
+        ]
         columns = {
             "stiffness": np.concatenate([peer.stiffness for peer in self.peers]),
             "rest_length": np.concatenate(lengths),
@@ -72,11 +76,6 @@ class Springs(Interaction):
         for name, column in rows.items():
             setattr(self.bonds, name, model.array(column, wp.int32))
         self.bonds.world = model.array(model.world_of[rows["particle"]], wp.int32)
-
-    def _lengths(self, model: Model, w: int) -> np.ndarray:
-        if self.rest_length is not None:
-            return self.rest_length
-        return topology.distances(model, w, self.pairs)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         force = kernels.force_kernel(self.model.precision, self.model.periodic)

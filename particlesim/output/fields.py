@@ -13,7 +13,7 @@ from ..interactions.fluid.sph import SPH
 from . import colors
 
 OWNER = "UsdRecorder"
-DERIVED = ("speed",)
+DERIVED = ("speed", "unwrapped")
 OF_THE_FLUID = frozenset({"density", "pressure"})
 
 
@@ -21,7 +21,9 @@ class ParticleFields:
     """Reads per-particle values of a simulation by name.
 
     A name is an array of the state (``"density"``, ``"force"``), an attribute that the particles
-    were given, ``"mass"``, ``"radius"``, or ``"speed"``, the length of the velocity.
+    were given, ``"mass"``, ``"radius"``, ``"speed"``, the length of the velocity, or
+    ``"unwrapped"``, the position as without a periodic box, in float64. In a periodic scene
+    ``"image"`` counts the boxes in between, so that unwrapped = position + image * box length.
 
     Args:
         sim: The simulation.
@@ -62,6 +64,8 @@ class ParticleFields:
         if name == "speed":
             v = self.sim.get("velocity")
             return np.sqrt(np.einsum("ij,ij->i", v, v))
+        if name == "unwrapped":
+            return self.sim.state.unwrapped()
         return self.sim.model.column(name)
 
     def _complete_density(self) -> None:
@@ -77,7 +81,7 @@ def readable(sim: Source) -> list[str]:
     held = {
         name
         for name, array in sim.state.arrays.items()
-        if len(array) == sim.model.particle_count and name not in ("image", "time")
+        if len(array) == sim.model.particle_count and name != "time"
     }
     return sorted(held | set(sim.model.attributes) | set(DERIVED))
 

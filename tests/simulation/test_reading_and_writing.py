@@ -141,7 +141,7 @@ def test_reset_repeats_the_run(method, liquid, device):
     first, t = sim.position, sim.time
     sim.reset()
     assert sim.time == 0
-    np.testing.assert_array_equal(sim.position, sim.model.wrapped(sim.scenes[0].position)
+    np.testing.assert_array_equal(sim.position, sim.state.start("position")
                                   .astype(np.float32))  # fmt: skip
     sim.run(5)
     assert sim.time == t

@@ -175,7 +175,7 @@ def test_reset_of_some_worlds(build, method, precision, device):
     sim.run(6)
     sim.reset([1, 2])
     np.testing.assert_array_equal(
-        sim.world(1).position, sim.model.wrapped(sim.model.column("position"))[sim.world(1).rows]
+        sim.world(1).position, sim.state.start("position")[sim.world(1).rows]
         .astype(precision),
     )  # fmt: skip
     sim.run(5)

@@ -31,7 +31,7 @@ class Trace:
             now = sim.diagnostics()
             self.kinetic.append(now.kinetic)
             self.energy.append(now.energy)
-            x, m = _unwrapped(sim), sim.get("mass").astype(np.float64)
+            x, m = sim.state.unwrapped(), sim.get("mass").astype(np.float64)
             center, spread = [], []
             for w in range(sim.world_count):
                 rows = slice(int(sim.model.offsets[w]), int(sim.model.offsets[w + 1]))
@@ -83,11 +83,3 @@ def _ratio(change: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """Change over scale; where there is no scale, any change is too much."""
     result = np.where(change == 0, 0.0, np.copysign(np.inf, change))
     return np.divide(change, scale, out=result, where=scale > 0)
-
-
-def _unwrapped(sim: Simulation) -> np.ndarray:
-    """Positions without the jumps of periodic boxes."""
-    x = sim.position.astype(np.float64)
-    if "image" in sim.state:
-        x += sim.get("image") * sim.model.box_length[sim.model.world_of]
-    return x

@@ -9,7 +9,6 @@ import warp as wp
 
 from ... import validate
 from ...engine.execution.launch import launch
-from ...engine.model import Model
 from ...kernels.engine.neighbors import cell_coordinates_kernel
 from ...kernels.interactions import sph as kernels
 from .sph import SPH
@@ -74,7 +73,7 @@ def _sums(sph: SPH, world: int, slots: slice, where: np.ndarray, samples: np.nda
     host = x.numpy().astype(np.float64)
     grid, cells = sph.pairs.grid_over(world, host)
     cells.first = 0  # of the slots at hand
-    points = model.array(_within_box(model, world, where), precision.vec3)
+    points = model.array(model.wrapped(where, world)[0], precision.vec3)
     # Points out of reach look into the outermost cells, so that cell numbers stay small.
     reach = 1.1 * sph.pairs.reach[world]
     near = np.clip(points.numpy(), host.min(axis=0) - reach, host.max(axis=0) + reach)
@@ -92,10 +91,3 @@ def _sums(sph: SPH, world: int, slots: slice, where: np.ndarray, samples: np.nda
         device,
     )  # fmt: skip
     return sums.numpy().astype(np.float64)
-
-
-def _within_box(model: Model, world: int, where: np.ndarray) -> np.ndarray:
-    """Points moved into the periodic box of the world."""
-    length, lower = model.box_length[world], model.box_lower[world]
-    boxes = np.divide(where - lower, length, out=np.zeros_like(where), where=length > 0)
-    return where - length * np.floor(boxes)

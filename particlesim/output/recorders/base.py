@@ -97,8 +97,8 @@ class ParticleRecorder(Recorder):
         sim: The simulation.
         path: The output; its suffix is the class's.
         frames: How many more frames of the simulation are planned; more or fewer may come.
-        fields: Names of further values to write: arrays of the state (``"density"``), attributes
-            of the particles, ``"speed"``.
+        fields: Names of further values to write: arrays of the state (``"density"``, in a periodic
+            scene ``"image"``), attributes of the particles, ``"speed"``, ``"unwrapped"`` positions.
         every: Record every k-th frame of the simulation; recorded frames count one by one.
         overwrite: Replace an existing output.
         resume: Go on after the recorded frame of this number; those after it are replaced.

@@ -26,16 +26,17 @@ HEADER, ENTRY = 256, 32  # bytes
 MAGIC = 0x65DF65DF65DF65DF
 ARRAYS = 16  # at most, of the schema's own in a frame
 # What the schema has a place for; all else are logged quantities.
-KNOWN = {"position": "position", "velocity": "velocity", "group": "typeid"}
+KNOWN = {"position": "position", "velocity": "velocity", "group": "typeid", "image": "image"}
 
 
 class GsdRecorder(ParticleRecorder):
     """Records frames into one GSD file (needs the extra ``gsd``).
 
-    Positions, velocities, groups (as types), masses and diameters are where the HOOMD schema has
-    them; ``log/particles/id``, ``/world`` and the fields beside, and ``log/time``. The box is the
-    periodic one; on an open axis it is as long as twice the start positions reach. Positions stay
-    as they are: HOOMD's box is around the origin, so that they may lie an image away.
+    Positions, velocities, groups (as types), masses, diameters and images are where the HOOMD
+    schema has them; ``log/particles/id``, ``/world`` and the fields beside, and ``log/time``. The
+    box is the periodic one; on an open axis it is as long as twice the frame's positions reach, so
+    that nobody is outside. Positions stay as they are: HOOMD's box is around the origin, so that in
+    a periodic one they may lie an image away; unwrapped, position + image * box, they are right.
 
     A frame is appended at the end, and its data come before what leads to them. When the process
     is killed, the frames whose write had returned can be read. A kill may leave a part of the next
@@ -52,8 +53,13 @@ class GsdRecorder(ParticleRecorder):
         self._open: Any = None
         self._first = 0
         super().__init__(*arguments, **options)
-        self._box = self._whole_box()
         self._mass = self.sim.model.column("mass")
+
+    def _capture(self) -> ParticleFrame:
+        frame = super()._capture()
+        if "image" in self.sim.state:
+            frame.columns["image"] = self.sim.get("image")
+        return frame
 
     def _begin(self, frame: ParticleFrame) -> None:
         # Prepared under another name, since an empty file is not a trajectory.
@@ -116,12 +122,12 @@ class GsdRecorder(ParticleRecorder):
     def _frame(self, frame: ParticleFrame) -> Any:
         made, columns = self._library.Frame(), frame.columns
         made.configuration.step = frame.number * self.every
-        made.configuration.box = self._box
+        made.configuration.box = self._box(columns["position"])
         particles = made.particles
         particles.N = len(columns["position"])
         particles.types = self.group_names
-        for name, place in KNOWN.items():
-            setattr(particles, place, columns[name])
+        for name in KNOWN.keys() & columns.keys():
+            setattr(particles, KNOWN[name], columns[name])
         particles.diameter = 2.0 * columns["radius"]
         particles.mass = self._mass
         made.log["time"] = np.array([frame.time])
@@ -145,13 +151,14 @@ class GsdRecorder(ParticleRecorder):
         ]
         return all(np.array_equal(np.asarray(a), np.asarray(b)) for a, b in pairs)
 
-    def _whole_box(self) -> list[float]:
-        """Lengths of the box, and no tilts."""
-        positions = [scene.position for scene in self.sim.scenes]
-        reach = np.abs(np.concatenate([np.zeros((1, 3)), *positions])).max(axis=0)
-        length = self.sim.model.box_length.max(axis=0) if self.sim.model.periodic else np.zeros(3)
-        reached = np.where(reach > 0, 2.0 * reach, 1.0)
-        return [*np.where(length > 0, length, reached).tolist(), 0.0, 0.0, 0.0]
+    def _box(self, x: np.ndarray) -> list[float]:
+        """Lengths of the box, and no tilts; those of open axes hold all of x."""
+        length = self.sim.model.box_length.max(axis=0)
+        reach = 2.0 * np.abs(x).max(axis=0, initial=0.0)
+        single = reach.astype(np.float32)  # as it is written
+        reach = np.where(single < reach, np.nextafter(single, np.float32(np.inf)), single)
+        open_length = np.where(reach > 0, reach, 1.0)
+        return [*np.where(length > 0, length, open_length).tolist(), 0.0, 0.0, 0.0]
 
 
 # The layout ------------------------------------------------------------------------------------

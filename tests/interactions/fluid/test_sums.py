@@ -132,7 +132,7 @@ def test_loops_vectorise(tmp_path):
     """Clang warns about a loop that it was told to vectorise and could not."""
     run = subprocess.run(
         [sys.executable, "-c", _COMPILE], capture_output=True, text=True,
-        env={**os.environ, "WARP_CACHE_PATH": str(tmp_path)},
+        env={**os.environ, "WARP_CACHE_PATH": str(tmp_path), "PARTICLESIM_VERBOSE": "1"},
     )  # fmt: skip
     assert run.returncode == 0, run.stderr
     assert "compiled" in run.stdout

@@ -109,8 +109,10 @@ def test_gsd(tmp_path, precision):
         for k, frame in enumerate(wanted):
             particles, log = file[k].particles, file[k].log
             assert file[k].configuration.step == k and particles.types == ["drops", "stone"]
-            # Of the periodic axes; the open one reaches from the origin to y = 1, both ways.
-            assert file[k].configuration.box.tolist() == [4, 2, 2, 0, 0, 0]
+            # Of the periodic axes; the open one reaches from the origin to all of y, both ways.
+            box = file[k].configuration.box.tolist()
+            assert box[0] == 4 and box[2:] == [2, 0, 0, 0]
+            assert box[1] == pytest.approx(2 * np.abs(frame["position"][:, 1]).max(), rel=2e-7)
             found = {name.removeprefix("particles/"): array for name, array in log.items()}
             found |= {
                 "position": particles.position, "velocity": particles.velocity,
