@@ -174,6 +174,40 @@ class Packed:
         return run
 
 
+# Watching ---------------------------------------------------------------------------------------
+
+# How native functions that do device work begin; others allocate and ask.
+WORK = tuple(f"wp_{each}" for each in (
+    "memcpy", "memset", "memtile", "array_", "cuda_launch_kernel", "cpu_launch_kernel",
+    "hash_grid_up", "bvh_re", "mesh_re", "mesh_set", "radix_sort", "segmented_sort", "runlength",
+    "bsr_",
+))  # fmt: skip
+
+
+def doors() -> list[tuple[Any, str, str]]:
+    """Where all work that is asked of Warp passes: owner, name, and what goes through.
+
+    ``launch`` and ``write`` are to be recorded, ``native`` is an object of all native functions,
+    the others are what a user has written.
+
+    Rests on: Warp looks up ``launch`` and ``copy`` in ``warp`` or ``warp._src.context``, launches
+    on a CPU by ``invoke`` there, and calls native functions as members of ``runtime.core``; arrays
+    take data of the host by ``_init_from_data``.
+    """
+    context, kinds = wp._src.context, (wp.array, wp.indexedarray)
+    reads = ("numpy", "list", "__dlpack__", "__array_interface__", "__cuda_array_interface__")
+    cpu = ("invoke", "invoke_cpu_blocks")
+    return [
+        *[(owner, "launch", "launch") for owner in (wp, context)],
+        *[(owner, "copy", "write") for owner in (wp, context)],
+        *[(kind, name, "write") for kind in kinds for name in ("zero_", "fill_")],
+        *[(k, n, f"array.{n}") for k in kinds for n in reads if n in vars(k)],
+        (wp.array, "_init_from_data", "an array made of data"),
+        *[(context, name, "a launch that cannot be recorded") for name in cpu],
+        (context.runtime, "core", "native"),
+    ]
+
+
 # Native code ------------------------------------------------------------------------------------
 
 

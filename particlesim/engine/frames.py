@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import warp as wp
 
+from .. import validate
 from ..kernels.instruments.watchdog import peak_kernel
+from ..scene.part import Interaction
+from .execution.acting import record_acts
 from .execution.executors import Executor
-from .execution.launch import Frame, launch, record
+from .execution.launch import Frame, Program, launch, record
 from .loop import Loop
 from .snapshot import Snapshot
 from .state import State
@@ -89,13 +92,30 @@ class Frames:
         """A frame of so many substeps; ``peak``: where to note the largest speeds."""
         loop, frame = self.loop, Frame(repeat=substeps)
         model, state = loop.model, loop.state
-        with record(frame.before):
-            self.snapshot.take()
-        with record(frame.substep):
+
+        def substep() -> None:
             loop.substep(loop.settings.dt / substeps)
             if peak is not None:
                 kernel = peak_kernel(model.precision)
                 launch(kernel, model.particle_count, [state.velocity, peak], model.device)
+
+        with record(frame.before):
+            self.snapshot.take()
+        frame.substep = record_acts(loop.actors, substep)
+        self._refuse_idle(frame.substep)
         with record(frame.after):
             self.guard.look(state)
         return frame
+
+    def _refuse_idle(self, substep: Program) -> None:
+        """A part that nothing was recorded of has done what it does, once and for all."""
+        for part in [*self.loop.passes, *self.loop.constraints]:
+            if id(part) not in substep.acted and self._has_members(part):
+                method = "apply" if isinstance(part, Interaction) else "project"
+                raise validate.fail(
+                    part.name, method, "launch something whenever it is called", "nothing",
+                    "use ps.launch or wp.launch, or set host = True where it works in NumPy",
+                )  # fmt: skip
+
+    def _has_members(self, part: Any) -> bool:
+        return len(self.loop.model.members([peer.group for peer in part.peers], part.name)) > 0
