@@ -8,10 +8,12 @@ fails first on a Warp that has changed it (tests/kernels/test_warp_*.py), and
 from __future__ import annotations
 
 import ctypes
+import functools
 import hashlib
 import inspect
 import linecache
 import textwrap
+import threading
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -206,6 +208,30 @@ def doors() -> list[tuple[Any, str, str]]:
         *[(context, name, "a launch that cannot be recorded") for name in cpu],
         (context.runtime, "core", "native"),
     ]
+
+
+class _OfThread:
+    """An attribute that each thread has for itself; None where it has not been set."""
+
+    def __init__(self) -> None:
+        self.values = threading.local()
+
+    def __get__(self, owner: Any, kind: type) -> Any:
+        return getattr(self.values, "value", None)
+
+    def __set__(self, owner: Any, value: Any) -> None:
+        self.values.value = value
+
+
+@functools.cache
+def part_captures() -> None:
+    """From now on a capture on a CPU holds what its own thread launches, and no other's.
+
+    Rests on: Warp tells a capture under way by ``runtime._apic_capture`` and ``_apic_graph``, of
+    all threads; its native code keeps them apart.
+    """
+    for name in ("_apic_capture", "_apic_graph"):
+        setattr(type(wp._src.context.runtime), name, _OfThread())
 
 
 # Native code ------------------------------------------------------------------------------------

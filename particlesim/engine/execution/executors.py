@@ -10,6 +10,7 @@ from typing import Any
 
 import warp as wp
 
+from ...kernels.warp_internals import part_captures
 from ...scene.settings import Settings
 from .launch import CHUNK, Frame, Launch, Program, When, Whole
 from .threads import Chain, Team
@@ -48,6 +49,7 @@ class GraphExecutor:
 
 
 def _capture(parts: Sequence[Program], device: Any) -> Any:
+    part_captures()
     with wp.ScopedCapture(device=device) as capture:
         for part in parts:
             part.issue()
