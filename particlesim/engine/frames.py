@@ -59,6 +59,14 @@ class Frames:
             self._restart()
             self.executor(substeps).run()
 
+    def place_on_constraints(self, iterations: int) -> None:
+        """See :meth:`Loop.place_on_constraints`; again where a row of neighbours was full."""
+        self.snapshot.take()
+        self.loop.place_on_constraints(iterations)
+        while self.loop.neighbors.overflowing:
+            self._restart()
+            self.loop.place_on_constraints(iterations)
+
     def peaks(self, substeps: int) -> np.ndarray:
         """One frame, and the largest |v_a| that each particle had at the end of a substep, (n,)."""
         model = self.loop.model
@@ -72,11 +80,10 @@ class Frames:
             self._restart()
             peak.zero_()
 
-    def close(self) -> None:
-        """Let go of graphs and threads."""
-        for executor in self._executors.values():
-            executor.close()
-        self._executors.clear()
+    def close(self, *, but: int | None = None) -> None:
+        """Let go of graphs and threads, but of those for so many substeps."""
+        for substeps in self._executors.keys() - {but}:
+            self._executors.pop(substeps).close()
 
     def _restart(self) -> None:
         """Make room in the rows that were full, and go back to the start of the frame."""

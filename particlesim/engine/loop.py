@@ -130,7 +130,6 @@ class Loop:
             wp.copy(self.state.previous_position, self.state.position)
         # Without a time scale compliance is nothing: alpha / dt^2 = 0.
         self.constrain(math.inf, iterations)
-        self.neighbors.grow()
 
     @property
     def outdated(self) -> bool:
