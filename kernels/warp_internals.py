@@ -196,13 +196,19 @@ def doors() -> list[tuple[Any, str, str]]:
     on a CPU by ``invoke`` there, and calls native functions as members of ``runtime.core``; arrays
     take data of the host by ``_init_from_data``.
     """
-    context, kinds = wp._src.context, (wp.array, wp.indexedarray)
+    context = wp._src.context
+    kinds = dict.fromkeys([*wp.array.__mro__, *wp.indexedarray.__mro__])
     reads = ("numpy", "list", "__dlpack__", "__array_interface__", "__cuda_array_interface__")
     cpu = ("invoke", "invoke_cpu_blocks")
     return [
         *[(owner, "launch", "launch") for owner in (wp, context)],
         *[(owner, "copy", "write") for owner in (wp, context)],
-        *[(kind, name, "write") for kind in kinds for name in ("zero_", "fill_")],
+        *[
+            (kind, name, "write")
+            for kind in kinds
+            for name in ("zero_", "fill_")
+            if name in vars(kind)
+        ],
         *[(k, n, f"array.{n}") for k in kinds for n in reads if n in vars(k)],
         (wp.array, "_init_from_data", "an array made of data"),
         *[(context, name, "a launch that cannot be recorded") for name in cpu],

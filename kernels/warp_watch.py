@@ -56,27 +56,31 @@ def _watch(more: int) -> None:
     with _lock:
         before, _watched = _watched, _watched + more
         if before == 0:
-            for owner, name, function in _functions():
-                _replaced.append((owner, name, inspect.getattr_static(owner, name)))
-                setattr(owner, name, function)
+            for owner, name, passes in _doors():
+                original = vars(owner)[name]
+                _replaced.append((owner, name, original))
+                setattr(owner, name, _watching(original, passes))
         elif _watched == 0:
             while _replaced:
                 setattr(*_replaced.pop())
 
 
-def _functions() -> Iterator[tuple[Any, str, Any]]:
-    for owner, name, passes in doors():
-        original = inspect.getattr_static(owner, name)
-        if passes == "launch":
-            yield owner, name, _told(original, _launch)
-        elif passes == "write":
-            yield owner, name, _told(original, _write)
-        elif passes == "native":
-            yield owner, name, _Native(original)
-        elif isinstance(original, property):
-            yield owner, name, property(_asked(original.fget, "array.numpy"))
-        else:
-            yield owner, name, _asked(original, passes)
+@functools.cache
+def _doors() -> list[tuple[Any, str, str]]:
+    return doors()
+
+
+@functools.cache
+def _watching(original: Any, passes: str) -> Any:
+    if passes == "launch":
+        return _told(original, _launch)
+    if passes == "write":
+        return _told(original, _write)
+    if passes == "native":
+        return _Native(original)
+    if isinstance(original, property):
+        return property(_asked(original.fget, "array.numpy"))
+    return _asked(original, passes)
 
 
 def _told(original: Callable[..., Any], tell: Callable[..., bool]) -> Callable[..., Any]:

@@ -103,6 +103,14 @@ def test_an_apply_that_does_nothing_is_refused_at_the_first_step():
         simulate(Own(kept_view)).step()
 
 
+def test_a_constraint_that_does_nothing_is_refused():
+    class Nothing(Floor):
+        def project(self, state, neighbors, dt): ...
+
+    with pytest.raises(ValueError, match="Nothing: project must launch something"):
+        simulate(Nothing(False)).step()
+
+
 def test_parts_without_members_are_not_refused():
     scene = ps.Scene()
     scene.add_particles([(0, 0, 0)])
@@ -110,7 +118,9 @@ def test_parts_without_members_are_not_refused():
     for _ in range(2):  # which share one pass
         scene.add_interaction(ps.LennardJones(nobody, cutoff=1.0))
     scene.add_interaction(ps.UniformGravity((0, -1, 0), nobody))
+    scene.add_interaction(Own(lambda part, state: None, group=nobody))
     scene.add_constraint(ps.Contact(nobody))
+    scene.add_constraint(ps.Contact())  # of a point
     scene.add_constraint(ps.PlaneBoundary((0, 0, 0), (0, 1, 0), group=nobody))
     ps.Simulation(scene, device="cpu").step()
 
