@@ -18,6 +18,7 @@ from .engine.neighbors import cells_type
 from .engine.rows import BLOCK, SPARE, row_functions
 from .precision import FLOAT64, function, register, structure, translate
 from .warp_internals import WRITTEN_FOR, Packed
+from .warp_watch import watched
 
 OPEN = Periodicity()
 VEC3, PAIR = FLOAT64.vec3, FLOAT64.vector(2)
@@ -30,7 +31,8 @@ def fast_ways() -> bool:
     Where they do not, one warning says so, and whoever asked is to fall back on Warp's own.
     """
     try:
-        fast, plain = _sums(vectorised=True), _sums(vectorised=False)
+        with watched(None):  # now, also where somebody records
+            fast, plain = _sums(vectorised=True), _sums(vectorised=False)
         # A sum of one term, with a handful of roundings in it.
         wrong = [] if np.allclose(fast, plain, rtol=1e-14, atol=0.0) else [f"{fast} not {plain}"]
     except Exception as error:

@@ -8,10 +8,12 @@ fails first on a Warp that has changed it (tests/kernels/test_warp_*.py), and
 from __future__ import annotations
 
 import ctypes
+import functools
 import hashlib
 import inspect
 import linecache
 import textwrap
+import threading
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -198,6 +200,70 @@ class Packed:
             call(bounds, arguments)
 
         return run
+
+
+# Watching ---------------------------------------------------------------------------------------
+
+# How native functions that do device work begin; others allocate and ask.
+WORK = tuple(f"wp_{each}" for each in (
+    "memcpy", "memset", "memtile", "array_", "cuda_launch_kernel", "cpu_launch_kernel",
+    "hash_grid_up", "bvh_re", "mesh_re", "mesh_set", "radix_sort", "segmented_sort", "runlength",
+    "bsr_",
+))  # fmt: skip
+
+
+def doors() -> list[tuple[Any, str, str]]:
+    """Where all work that is asked of Warp passes: owner, name, and what goes through.
+
+    ``launch`` and ``write`` are to be recorded, ``native`` is an object of all native functions,
+    the others are what a user has written.
+
+    Rests on: Warp looks up ``launch`` and ``copy`` in ``warp`` or ``warp._src.context``, launches
+    on a CPU by ``invoke`` there, and calls native functions as members of ``runtime.core``; arrays
+    take data of the host by ``_init_from_data``.
+    """
+    context = wp._src.context
+    kinds = dict.fromkeys([*wp.array.__mro__, *wp.indexedarray.__mro__])
+    reads = ("numpy", "list", "__dlpack__", "__array_interface__", "__cuda_array_interface__")
+    cpu = ("invoke", "invoke_cpu_blocks")
+    return [
+        *[(owner, "launch", "launch") for owner in (wp, context)],
+        *[(owner, "copy", "write") for owner in (wp, context)],
+        *[
+            (kind, name, "write")
+            for kind in kinds
+            for name in ("zero_", "fill_")
+            if name in vars(kind)
+        ],
+        *[(k, n, f"array.{n}") for k in kinds for n in reads if n in vars(k)],
+        (wp.array, "_init_from_data", "an array made of data"),
+        *[(context, name, "a launch that cannot be recorded") for name in cpu],
+        (context.runtime, "core", "native"),
+    ]
+
+
+class _OfThread:
+    """An attribute that each thread has for itself; None where it has not been set."""
+
+    def __init__(self) -> None:
+        self.values = threading.local()
+
+    def __get__(self, owner: Any, kind: type) -> Any:
+        return getattr(self.values, "value", None)
+
+    def __set__(self, owner: Any, value: Any) -> None:
+        self.values.value = value
+
+
+@functools.cache
+def part_captures() -> None:
+    """From now on a capture on a CPU holds what its own thread launches, and no other's.
+
+    Rests on: Warp tells a capture under way by ``runtime._apic_capture`` and ``_apic_graph``, of
+    all threads; its native code keeps them apart.
+    """
+    for name in ("_apic_capture", "_apic_graph"):
+        setattr(type(wp._src.context.runtime), name, _OfThread())
 
 
 # Native code ------------------------------------------------------------------------------------

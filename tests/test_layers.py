@@ -62,9 +62,9 @@ def test_no_circles():
 def test_kernels_import_warp_and_themselves():
     known = {"warp", "numpy", f"{PACKAGE}.kernels"}
     standard = {
-        "__future__", "abc", "ast", "collections", "ctypes", "dataclasses", "functools", "hashlib",
-        "inspect", "itertools", "linecache", "math", "re", "textwrap", "types", "typing",
-        "warnings",
+        "__future__", "abc", "ast", "collections", "contextlib", "contextvars", "ctypes",
+        "dataclasses", "functools", "hashlib", "inspect", "itertools", "linecache", "math", "re",
+        "textwrap", "threading", "types", "typing", "warnings",
     }  # fmt: skip
     for name in FILES:
         if room(name) == "kernels":

@@ -172,8 +172,9 @@ class BoxBoundary(Boundary):
         return crossing_limits(self, probe, names, lambda box, v: (box.upper - box.lower) / abs(v))
 
     def _pivot(self) -> np.ndarray:
-        middle = 0.5 * self.lower + 0.5 * self.upper
-        return middle if self.angular_velocity.any() else np.zeros(3)
+        # An open box, which does not turn, has no middle.
+        turns = self.angular_velocity.any()
+        return 0.5 * self.lower + 0.5 * self.upper if turns else np.zeros(3)
 
     def _carried(self) -> tuple[np.ndarray, np.ndarray]:
         # Along an axis without sides it moves in itself.

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import warp as wp
 
+from .. import validate
 from ..kernels.instruments.watchdog import peak_kernel
+from ..scene.part import Interaction
+from .execution.acting import record_acts
 from .execution.executors import Executor
-from .execution.launch import Frame, launch, record
+from .execution.launch import Frame, Program, launch, record
 from .loop import Loop
 from .snapshot import Snapshot
 from .state import State
@@ -56,6 +59,14 @@ class Frames:
             self._restart()
             self.executor(substeps).run()
 
+    def place_on_constraints(self, iterations: int) -> None:
+        """See :meth:`Loop.place_on_constraints`; again where a row of neighbours was full."""
+        self.snapshot.take()
+        self.loop.place_on_constraints(iterations)
+        while self.loop.neighbors.overflowing:
+            self._restart()
+            self.loop.place_on_constraints(iterations)
+
     def peaks(self, substeps: int) -> np.ndarray:
         """One frame, and the largest |v_a| that each particle had at the end of a substep, (n,)."""
         model = self.loop.model
@@ -69,11 +80,10 @@ class Frames:
             self._restart()
             peak.zero_()
 
-    def close(self) -> None:
-        """Let go of graphs and threads."""
-        for executor in self._executors.values():
-            executor.close()
-        self._executors.clear()
+    def close(self, *, but: int | None = None) -> None:
+        """Let go of graphs and threads, but of those for so many substeps."""
+        for substeps in self._executors.keys() - {but}:
+            self._executors.pop(substeps).close()
 
     def _restart(self) -> None:
         """Make room in the rows that were full, and go back to the start of the frame."""
@@ -89,13 +99,35 @@ class Frames:
         """A frame of so many substeps; ``peak``: where to note the largest speeds."""
         loop, frame = self.loop, Frame(repeat=substeps)
         model, state = loop.model, loop.state
-        with record(frame.before):
-            self.snapshot.take()
-        with record(frame.substep):
+
+        def substep() -> None:
             loop.substep(loop.settings.dt / substeps)
             if peak is not None:
                 kernel = peak_kernel(model.precision)
                 launch(kernel, model.particle_count, [state.velocity, peak], model.device)
+
+        with record(frame.before):
+            self.snapshot.take()
+        frame.substep = record_acts(loop.actors, substep)
+        self._refuse_idle(frame.substep)
         with record(frame.after):
             self.guard.look(state)
         return frame
+
+    def _refuse_idle(self, substep: Program) -> None:
+        """Of a part of one's own nothing was recorded: what it does it has done once and for all.
+
+        Ready parts know where there is nothing to do for them.
+        """
+        parts: list[Any] = [*self.loop.passes, *self.loop.constraints]
+        for part in parts:
+            method = part.apply if isinstance(part, Interaction) else part.project
+            ready = method.__module__.partition(".")[0] == __name__.partition(".")[0]
+            if id(part) not in substep.acted and not ready and self._has_members(part):
+                raise validate.fail(
+                    part.name, method.__name__, "launch something whenever it is called", None,
+                    "use ps.launch or wp.launch, or set host = True where it works in NumPy",
+                )  # fmt: skip
+
+    def _has_members(self, part: Any) -> bool:
+        return len(self.loop.model.members([peer.group for peer in part.peers], part.name)) > 0

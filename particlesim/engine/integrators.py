@@ -43,6 +43,7 @@ class Integrator:
 
     order: int = 1
     carries_forces = False
+    host = False  # whether it works in Python, and so has to be called in every substep
 
     def __init__(self, model: Model, state: State, *, constrained: bool, remember: bool):
         self.model, self.state, self.count = model, state, model.particle_count

@@ -14,6 +14,7 @@ from ..scene.fingerprint import laws_of
 from ..scene.part import ConstraintBase, Interaction, Part
 from ..scene.scene import Scene
 from ..scene.settings import Settings
+from .execution.acting import act
 from .execution.launch import owner
 from .integrators import method
 from .model import Model
@@ -72,36 +73,36 @@ class Loop:
     def substep(self, dt: float) -> None:
         """Advance by ``dt``: interactions, integration, constraints, velocities."""
         self.observers.begin(dt)
-        self.integrator.begin(dt)
+        act(self.integrator, self.integrator.begin, dt)
         self.forces(dt)
-        self.integrator.advance(dt)
+        act(self.integrator, self.integrator.advance, dt)
         self.constrain(dt, self.settings.iterations)
-        self.integrator.finish(dt)
+        act(self.integrator, self.integrator.finish, dt)
+        now = self.state, self.neighbors, dt
         for constraint in self.constraints:
-            with self.observers.acting(constraint, FINISH):
-                constraint.finish(self.state, self.neighbors, dt)
+            self.observers.act(constraint, FINISH, constraint.finish, *now)
         self.observers.end(dt)
 
     def forces(self, dt: float) -> None:
         """Interactions add forces at the present positions."""
         self.neighbors.update(self.state)
         self.state.clear_forces()
+        now = self.state, self.neighbors, dt
         for interaction in self.passes:
-            with self.observers.acting(interaction, FORCE):
-                interaction.apply(self.state, self.neighbors, dt)
+            self.observers.act(interaction, FORCE, interaction.apply, *now)
 
     def constrain(self, dt: float, iterations: int) -> None:
         """Constraints project the positions, one after the other, in each iteration."""
         if not self.constraints:
             return
         self.neighbors.update_for_constraints(self.state)
+        now = self.state, self.neighbors, dt
         for constraint in self.constraints:
             with owner(constraint.name):
-                constraint.begin(self.state, self.neighbors, dt)
+                act(constraint, constraint.begin, *now)
         for _ in range(iterations):
             for constraint in self.constraints:
-                with self.observers.acting(constraint, PROJECT):
-                    constraint.project(self.state, self.neighbors, dt)
+                self.observers.act(constraint, PROJECT, constraint.project, *now)
 
     # Outside a substep ------------------------------------------------------------------------
 
@@ -131,7 +132,6 @@ class Loop:
             wp.copy(self.state.previous_position, self.state.position)
         # Without a time scale compliance is nothing: alpha / dt^2 = 0.
         self.constrain(math.inf, iterations)
-        self.neighbors.grow()
 
     @property
     def outdated(self) -> bool:
@@ -146,6 +146,11 @@ class Loop:
     def parts(self) -> list[Interaction | ConstraintBase]:
         """All interactions, then all constraints."""
         return [*self.interactions, *self.constraints]
+
+    @property
+    def actors(self) -> list[Any]:
+        """Who acts in a substep."""
+        return [*self.passes, *self.constraints, self.integrator, *self.observers.all]
 
     def bound(self, owner: str, part: Part) -> Any:
         """The copy of a scene's part that is in motion here.

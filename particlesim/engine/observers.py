@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 import warp as wp
 
+from .execution.acting import act
 from .execution.launch import owner
 
 FORCE, PROJECT, FINISH = "force", "project", "finish"  # what a part is about to do, or has done
 
 
 class Observer:
-    """Told around every part of a substep. While a frame is recorded it may only launch."""
+    """Told around every part of a substep; launches, like a :class:`~particlesim.scene.part.Part`.
+
+    ``host`` says that it works in Python, and so has to be called in every substep.
+    """
 
     name = "observer"  # of what it keeps, in checkpoints
+    host = False
 
     def begin(self, dt: float) -> None:
         """A substep begins."""
@@ -62,26 +67,25 @@ class Observers:
     def begin(self, dt: float) -> None:
         """A substep begins."""
         for each in self.all:
-            each.begin(dt)
+            act(each, each.begin, dt)
 
     def end(self, dt: float) -> None:
         """The substep is done."""
         for each in self.all:
-            each.end(dt)
+            act(each, each.end, dt)
 
     def carried(self) -> list[wp.array]:
         """What all of them take from one evaluation of the forces to the next."""
         return [array for each in self.all for array in each.carried()]
 
-    @contextmanager
-    def acting(self, part: Any, stage: str) -> Iterator[None]:
-        """Around what ``part`` launches; the launches are remembered as its own."""
+    def act(self, part: Any, stage: str, function: Callable[..., None], *arguments: Any) -> None:
+        """Have ``part`` do something; what it launches is remembered as its own."""
         for each in self.all:
-            each.before(part, stage)
+            act(each, each.before, part, stage)
         with owner(part.name):
-            yield
+            act(part, function, *arguments)
         for each in self.all:
-            each.after(part, stage)
+            act(each, each.after, part, stage)
 
     @contextmanager
     def watching(self, observer: Observer) -> Iterator[None]:

@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 
 from ..scene.part import Interaction
-from .execution.launch import owner
+from .execution.acting import Attributes, act
 from .limit import Limit, explicit_step
 from .loop import Loop
 from .model import Model
@@ -120,8 +120,9 @@ class Probe:
         self._gather()
         self.state.clear_forces()
         for part in parts:
-            with owner(part.name):
-                part.apply(self.state, self.loop.neighbors, self.settings.substep)
+            own = Attributes(part)
+            act(part, part.apply, self.state, self.loop.neighbors, self.settings.substep)
+            own.restore()
         return self._host("force")
 
     def response(

@@ -74,7 +74,12 @@ def explain(frames: Frames) -> Explanation:
     for observer in loop.observers.all:
         arrays[f"({observer.name})"] = observer.memory / count
     total = sum(arrays.values()) + sum(each.memory for each in loop.neighbors.lists) / count
-    chosen = executor.chosen
+    execution = "graph or threads, as measured in the first frames"
+    if executor.chosen:
+        execution = executor.chosen.name
+    if frame.host:
+        who = {f"{each.owner} acts on the host ({each.reason})": None for each in frame.host}
+        execution += f"; no graph, which would be faster, since {' and '.join(who)}"
     worlds = f"{model.world_count} worlds of " if model.world_count > 1 else ""
     return Explanation(
         title=(
@@ -88,5 +93,5 @@ def explain(frames: Frames) -> Explanation:
         launches=always,
         conditional=sometimes,
         bytes_per_particle=total,
-        execution=chosen.name if chosen else "graph or threads, as measured in the first frames",
+        execution=execution,
     )

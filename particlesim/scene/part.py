@@ -20,10 +20,12 @@ class Part:
     :class:`~particlesim.engine.state.State`, ``neighbors`` its
     :class:`~particlesim.engine.neighbors.lists.Neighbors`.
 
-    ``requires`` names the per-particle arrays that the state must have.
+    ``requires`` names the per-particle arrays that the state must have. ``host`` says that it works
+    in Python or NumPy (see :class:`Interaction`).
     """
 
     requires: frozenset[str] = frozenset()
+    host: bool = False
     group: Any = None
     peers: Sequence[Any]
     model: Any  # once prepared
@@ -103,18 +105,49 @@ class Interaction(Part):
     """A force: subclasses say what they need and do one thing.
 
     In ``prepare`` it asks for what it looks at, ``neighbors.of(self)`` or a ``PairSum``; in
-    ``apply`` it adds to ``state.force`` and launches only (:func:`particlesim.launch`).
-    ``state`` is the present one; ``neighbors`` holds the pair lists, up to date for it.
-    ``parameters``, where there are any, is a dict of numbers and 3-vectors that may differ from
-    world to world. ``cutoff`` is the distance within which neighbours are looked for; None: all
-    pairs of a world.
+    ``apply`` it adds to ``state.force``. ``state`` is the present one; ``neighbors`` holds the pair
+    lists, up to date for it. ``parameters``, where there are any, is a dict of numbers and
+    3-vectors that may differ from world to world. ``cutoff`` is the distance within which
+    neighbours are looked for; None: all pairs of a world.
+
+    ``apply`` is recorded once and replayed in every substep: ``wp.launch``, ``wp.copy``, ``zero_``
+    and ``fill_`` are, with the numbers and arrays that they are given then, and so is
+    :func:`particlesim.launch`, which threads share too. Who reads or writes arrays on the host, by
+    ``numpy`` or ``assign``, changes his own attributes or draws from a generator among them is
+    called in every substep instead, without a graph: slower, as ``Simulation.explain`` tells. Where
+    something else differs from call to call, such as a number from elsewhere, set ``host = True``.
+
+    Example:
+        >>> import warp as wp
+        >>> from particlesim import Interaction, Scene, Settings, Simulation
+        >>> @wp.kernel(module="unique")
+        ... def blow(wind: wp.vec3, force: wp.array(dtype=wp.vec3)):
+        ...     i = wp.tid()
+        ...     force[i] = force[i] + wind
+        >>> class Wind(Interaction):
+        ...     def __init__(self, wind):
+        ...         self.wind = wp.vec3(*wind)
+        ...
+        ...     def prepare(self, model, neighbors):
+        ...         self.model = model
+        ...
+        ...     def apply(self, state, neighbors, dt):
+        ...         inputs = [self.wind, state.force]
+        ...         wp.launch(blow, state.count, inputs, device=self.model.device)
+        >>> scene = Scene()
+        >>> leaf = scene.add_particles([(0, 0, 0)], mass=2.0)
+        >>> wind = scene.add_interaction(Wind((1, 0, 0)))
+        >>> sim = Simulation(scene, Settings(dt=0.5), device="cpu")
+        >>> sim.run(4)
+        >>> sim.velocity.round(5).tolist()
+        [[1.0, 0.0, 0.0]]
     """
 
     requires: frozenset[str] = frozenset({"force"})
     cutoff: float | None = None
 
     def apply(self, state: Any, neighbors: Any, dt: float) -> None:
-        """Add forces: launches only."""
+        """Add forces."""
         raise validate.undefined(self, "apply(self, state, neighbors, dt)")
 
     def measure(self, state: Any, energy: Any, virial: Any) -> None:
@@ -142,18 +175,47 @@ class ConstraintBase(Part):
 
     In a substep: ``begin`` once, then ``project`` in each iteration, in turn with the other
     constraints, then, when the velocities have followed the projection, ``finish``. Corrections
-    are added to ``state.position`` and, the same amount, to ``state.correction``.
+    are added to ``state.position`` and, the same amount, to ``state.correction``. What these
+    methods may do is what ``apply`` of an :class:`Interaction` may.
+
+    Example:
+        >>> import warp as wp
+        >>> from particlesim import ConstraintBase, Scene, Settings, Simulation, launch
+        >>> Vectors = wp.array(dtype=wp.vec3)
+        >>> @wp.kernel(module="unique")
+        ... def lift(first: int, height: float, x: Vectors, correction: Vectors):
+        ...     i = first + wp.tid()
+        ...     up = wp.vec3(0.0, wp.max(height - x[i][1], 0.0), 0.0)
+        ...     x[i] = x[i] + up
+        ...     correction[i] = correction[i] + up
+        >>> class Floor(ConstraintBase):
+        ...     def __init__(self, height):
+        ...         self.height = height
+        ...
+        ...     def prepare(self, model, neighbors):
+        ...         self.model = model
+        ...
+        ...     def project(self, state, neighbors, dt):
+        ...         inputs = [self.height, state.position, state.correction]
+        ...         launch(lift, state.count, inputs, self.model.device)
+        >>> scene = Scene()
+        >>> stone = scene.add_particles([(0, 1, 0)], velocity=(3, -4, 0))
+        >>> floor = scene.add_constraint(Floor(0.5))
+        >>> sim = Simulation(scene, Settings(dt=0.5), device="cpu")
+        >>> sim.run(2)
+        >>> sim.position.round(5).tolist(), sim.velocity.round(5).tolist()
+        ([[3.0, 0.5, 0.0]], [[3.0, 0.0, 0.0]])
     """
 
     def begin(self, state: Any, neighbors: Any, dt: float) -> None:
-        """At the start of a substep's projection: launches only."""
+        """At the start of a substep's projection."""
 
     def project(self, state: Any, neighbors: Any, dt: float) -> None:
-        """One sweep: launches only."""
+        """One sweep."""
         raise validate.undefined(self, "project(self, state, neighbors, dt)")
 
     def finish(self, state: Any, neighbors: Any, dt: float) -> None:
-        """After the velocities have followed: restitution, breaking. Launches only."""
+        """After the velocities have followed: restitution, breaking."""
 
     def read_force(self, part: Part) -> np.ndarray:
         """See ``Simulation.force``; ``part`` is this, or the one of some worlds' scenes."""

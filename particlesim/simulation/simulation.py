@@ -161,7 +161,7 @@ class Simulation(Reading):
             iterations: Sweeps over all constraints.
         """
         validate.whole("Simulation.project", "iterations", iterations)
-        self.loop.place_on_constraints(iterations)
+        self.frames.place_on_constraints(iterations)
         self.watchdog.placed(self.loop, range(self.world_count))
 
     @property

@@ -10,8 +10,9 @@ from typing import Any
 
 import warp as wp
 
+from ...kernels.warp_internals import part_captures
 from ...scene.settings import Settings
-from .launch import CHUNK, Frame, Launch, Program, When
+from .launch import CHUNK, Frame, Launch, Program, When, Whole
 from .threads import Chain, Team
 
 LARGEST_GRAPH = 4096  # operations
@@ -48,6 +49,7 @@ class GraphExecutor:
 
 
 def _capture(parts: Sequence[Program], device: Any) -> Any:
+    part_captures()
     with wp.ScopedCapture(device=device) as capture:
         for part in parts:
             part.issue()
@@ -57,8 +59,8 @@ def _capture(parts: Sequence[Program], device: Any) -> Any:
 class EagerExecutor:
     """Runs a frame launch by launch, as it would be without any recording.
 
-    The way out where a driver cannot capture a frame, conditional parts above all: slower, since
-    the host looks at every flag, but the same.
+    The way out where a part acts on the host, or a driver cannot capture a frame, conditional parts
+    above all: slower, since the host looks at every flag, but the same.
     """
 
     name = "eager"
@@ -102,7 +104,7 @@ def _steps(program: Program, team: Team, threads: int) -> list[Callable[[], None
     steps: list[Callable[[], None]] = []
     launches: list[Launch] = []
     for operation in program.operations:
-        if isinstance(operation, Launch):
+        if isinstance(operation, Launch) and not isinstance(operation, Whole):
             launches.append(operation)
             continue
         if launches:
@@ -110,6 +112,8 @@ def _steps(program: Program, team: Team, threads: int) -> list[Callable[[], None
             launches = []
         if isinstance(operation, When):
             steps.append(_If(operation.flag, _steps(operation.body, team, threads)).run)
+        elif isinstance(operation, Whole):
+            steps.append(operation.record()[0].launch)
         else:
             steps.append(operation.function)
     if launches:
@@ -181,6 +185,8 @@ class Executor:
     def _make(self, way: str) -> AnyExecutor:
         if way == "threads":
             return ThreadExecutor(self.frame, self.threads)
+        if self.frame.host:
+            return EagerExecutor(self.frame)
         try:
             return GraphExecutor(self.frame, self.device)
         except RuntimeError as error:

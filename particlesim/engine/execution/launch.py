@@ -9,17 +9,22 @@ number of them agree bit for bit.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any
 
 import warp as wp
 
+from ...kernels.warp_watch import watched
+
 CHUNK = 512  # particles under which a launch is not worth cutting
 
-_recording: list[Program] = []
-_owners: list[str] = ["loop"]
+# Of each thread its own: what another one launches meanwhile is none of this program.
+_program: ContextVar[Program | None] = ContextVar("program", default=None)
+_owner: ContextVar[str] = ContextVar("owner", default="loop")
 
 
 @dataclass
@@ -57,6 +62,19 @@ class Launch:
 
 
 @dataclass
+class Whole(Launch):
+    """A launch by ``wp.launch``, whose kernel knows of no first row: it is never cut."""
+
+    arguments: dict[str, Any] = field(default_factory=dict)
+
+    def issue(self) -> None:
+        wp.launch(**self.arguments)
+
+    def record(self, chunks: int = 1, least: int = CHUNK) -> list[Any]:
+        return [wp.launch(**self.arguments, record_cmd=True)]
+
+
+@dataclass
 class Call:
     """Work that Warp offers as a function: a grid build, a fill, a copy."""
 
@@ -64,6 +82,14 @@ class Call:
 
     def issue(self) -> None:
         self.function()
+
+
+@dataclass
+class Host(Call):
+    """What somebody does by himself in every substep, with Python or NumPy: no graph can."""
+
+    owner: str
+    reason: str
 
 
 @dataclass
@@ -82,6 +108,9 @@ class Program:
     """A recorded sequence of device work."""
 
     operations: list[Launch | Call | When] = field(default_factory=list)
+    touched: bool = False  # something was launched, be it over no rows
+    hosts: dict[int, str] = field(default_factory=dict)  # ids of who cannot be recorded, and why
+    acted: set[int] = field(default_factory=set)  # ids of who did something
 
     def issue(self) -> None:
         for operation in self.operations:
@@ -95,25 +124,75 @@ class Program:
             elif isinstance(operation, When):
                 yield from operation.body.launches()
 
+    def add(self, operation: Launch | Call | When) -> None:
+        """Append what was asked for."""
+        self.operations.append(operation)
+        self.touched = True
+
+
+class _Recorder:
+    """Records what is asked of Warp itself (a :class:`~particlesim.kernels.warp_watch.Watcher`)."""
+
+    def launch(self, arguments: dict[str, Any]) -> None:
+        dim = arguments["dim"]
+        rows = math.prod(dim) if isinstance(dim, Sequence) else int(dim)
+        device = arguments.get("device")
+        inputs = [*arguments.get("inputs", ()), *arguments.get("outputs", ())]
+        _now().add(Whole(arguments["kernel"], rows, inputs, device, _owner.get(), arguments))
+
+    def call(self, run: Callable[[], None]) -> None:
+        _now().add(Call(run))
+
+    def host(self, what: str) -> None:
+        """Outside of what parts do, the framework knows what it asks for."""
+        if _acting.get():
+            raise OnHost(what)
+
+
+class OnHost(BaseException):
+    """Ends what a part does while it is recorded: no program can hold it."""
+
+
+_acting: ContextVar[bool] = ContextVar("acting", default=False)
+
 
 @contextmanager
-def record(program: Program) -> Iterator[Program]:
-    """Append the launches made inside to ``program`` instead of running them."""
-    _recording.append(program)
+def _set(variable: ContextVar[Any], value: Any) -> Iterator[None]:
+    token = variable.set(value)
     try:
-        yield program
+        yield
     finally:
-        _recording.pop()
+        variable.reset(token)
+
+
+def _now() -> Program:
+    program = _program.get()
+    assert program is not None
+    return program
+
+
+def recording() -> Program | None:
+    """What is being recorded in this thread."""
+    return _program.get()
+
+
+@contextmanager
+def record(program: Program, *, strict: bool = False) -> Iterator[Program]:
+    """Append the launches made inside to ``program`` instead of running them.
+
+    Args:
+        program: To append to.
+        strict: What cannot be appended raises :class:`OnHost`.
+    """
+    with _set(_program, program), _set(_acting, strict or _acting.get()), watched(_Recorder()):
+        yield program
 
 
 @contextmanager
 def owner(name: str) -> Iterator[None]:
     """Remember who made the launches inside, for ``explain``."""
-    _owners.append(name)
-    try:
+    with _set(_owner, name):
         yield
-    finally:
-        _owners.pop()
 
 
 def launch(kernel: Any, dim: int, inputs: Sequence[Any], device: Any) -> None:
@@ -150,19 +229,23 @@ def launch(kernel: Any, dim: int, inputs: Sequence[Any], device: Any) -> None:
         >>> velocity.numpy().tolist()
         [[0.0, 0.5, 0.0], [0.0, 0.5, 0.0]]
     """
+    program = _program.get()
     if dim == 0:
+        if program is not None:
+            program.touched = True
         return
-    operation = Launch(kernel, dim, inputs, device, _owners[-1])
-    if _recording:
-        _recording[-1].operations.append(operation)
+    operation = Launch(kernel, dim, inputs, device, _owner.get())
+    if program is not None:
+        program.add(operation)
     else:
         operation.issue()
 
 
 def call(function: Callable[[], None]) -> None:
     """Run ``function``, which enqueues device work and nothing else, in its turn."""
-    if _recording:
-        _recording[-1].operations.append(Call(function))
+    program = _program.get()
+    if program is not None:
+        program.add(Call(function))
     else:
         function()
 
@@ -173,8 +256,9 @@ def when(flag: wp.array) -> Iterator[None]:
     body = Program()
     with record(body):
         yield
-    if _recording:
-        _recording[-1].operations.append(When(flag, body))
+    program = _program.get()
+    if program is not None:
+        program.add(When(flag, body))
     elif flag.numpy()[0]:
         body.issue()
 
@@ -197,6 +281,11 @@ class Frame:
     def parts(self) -> tuple[Program, Program, Program]:
         """The three programs."""
         return self.before, self.substep, self.after
+
+    @property
+    def host(self) -> list[Host]:
+        """What keeps it from being a graph."""
+        return [each for part in self.parts for each in part.operations if isinstance(each, Host)]
 
     def load(self) -> None:
         """Compile and load every kernel now rather than in the middle of a capture."""

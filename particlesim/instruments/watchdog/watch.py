@@ -90,9 +90,11 @@ class Watchdog:
         culprits = self._wrong(frames, substeps)
         if culprits:
             culprits = trace(frames, self.limits, culprits, substeps)
-            {"stop": self._stop, "retry": self._retry, "freeze": self._freeze}[
-                self.settings.on_failure
-            ](frames, culprits)
+            act = {"stop": self._stop, "retry": self._retry, "freeze": self._freeze}
+            try:
+                act[self.settings.on_failure](frames, culprits)
+            finally:
+                frames.close(but=substeps)  # the threads of finer frames go home
         self.flag.zero_()
 
     def _wrong(self, frames: Frames, substeps: int) -> list[Culprit]:
