@@ -115,6 +115,7 @@ def run(
     """
     with opened(debug) as meter:
         _check_output(out, overwrite, resume)
+        _check_places(out, history)
         module = load(scene, debug)
         sim = simulation(
             module, options, device, worlds, precision=precision, substeps=substeps, ledger=ledger
@@ -220,6 +221,15 @@ def _steps(layout: str | None) -> Any:
     if len(steps) != 3:
         raise ValueError(f"--layout must be grid or three numbers, got {layout!r}; write 2,0,0.")
     return steps
+
+
+def _check_places(out: Path | None, history: Path | None) -> None:
+    """Refuse, before anything is loaded, what cannot be written or somebody else is writing."""
+    from ..output.lock import Lock
+
+    for option, path in (("--out", out), ("--history", history)):
+        if path is not None:
+            Lock("run", path, option).close()
 
 
 def _check_output(out: Path | None, overwrite: bool, resume: bool) -> None:

@@ -11,6 +11,7 @@ from .. import validate
 from ..instruments.watchdog.incident import SimulationError
 from ..output import files
 from ..output.history.writer import SUFFIXES, History
+from ..output.lock import Lock, lock_path
 from ..output.progress import Meter
 from ..output.recorders import open_recorder
 from ..output.recorders.background import BackgroundWriter
@@ -28,8 +29,13 @@ def run(
     first = sim.frame
     if history is not None:
         files.check_new("History", history, overwrite or resume, suffixes=SUFFIXES)
+    outputs = {"record": record, "history": history}
     with contextlib.ExitStack() as stack:
         recording = measured = None
+        locked: dict[Path, str] = {}
+        for argument, path in outputs.items():
+            if path is not None and locked.setdefault(lock_path(Path(path)), argument) == argument:
+                stack.enter_context(Lock(OWNER, Path(path), argument))
         if record is not None:
             # First of all: a run that is resumed moves on to its checkpoint.
             recording = stack.enter_context(
@@ -89,6 +95,7 @@ class Recording:
             sim, path, frames=max(0, end - sim.frame), overwrite=overwrite,
             resume=self.recorded, **options,
         )  # fmt: skip
+        self.recorder.locked = True  # by the run
         self.background = BackgroundWriter()
         if self.checkpoints is not None and self.recorded is None and sim.frame == first:
             self.checkpoints.start(overwrite)

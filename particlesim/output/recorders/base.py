@@ -15,6 +15,7 @@ from ... import validate
 from ...engine.loop import Source
 from .. import files
 from ..fields import ParticleFields
+from ..lock import Lock
 
 # What every frame has; a field cannot have these names.
 COLUMNS = ("position", "velocity", "radius", "id", "group", "world")
@@ -41,6 +42,8 @@ class Recorder(files.Closing):
         self.every = validate.whole(self.owner, "every", every, minimum=1)
         self.planned_last = (sim.frame + validate.whole(self.owner, "frames", frames)) // every
         self.fields = ParticleFields(sim, fields)
+        self.locked = False  # by whoever writes through this recorder, or by itself
+        self._lock: Lock | None = None
 
     def write(self) -> None:
         """Write the simulation's present state as its present frame, if that is to be recorded."""
@@ -58,11 +61,24 @@ class Recorder(files.Closing):
         """Write what :meth:`capture` returned; touches no simulation.
 
         Raises:
-            ValueError: A frame out of order. OSError: It could not be written; those before are
-                kept.
+            ValueError: A frame out of order. OSError: It could not be written, or somebody else is
+                writing there; those before are kept.
         """
-        if frame is not None:
-            self._write(frame)
+        if frame is None:
+            return
+        if not self.locked:
+            self._lock = Lock(self.owner, self.path)
+            self.locked = True
+        self._write(frame)
+
+    def close(self) -> None:
+        """Write what has to come at the end. May be called again."""
+        try:
+            self._close()
+        finally:
+            if self._lock is not None:
+                self._lock.close()
+                self._lock, self.locked = None, False
 
     @abstractmethod
     def _capture(self) -> Any:
@@ -71,6 +87,10 @@ class Recorder(files.Closing):
     @abstractmethod
     def _write(self, frame: Any) -> None:
         """Write it."""
+
+    @abstractmethod
+    def _close(self) -> None:
+        """Write the end, once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,8 +179,7 @@ class ParticleRecorder(Recorder):
         self._put(frame)
         self.last = frame.number
 
-    def close(self) -> None:
-        """Write what has to come at the end. May be called again."""
+    def _close(self) -> None:
         if not self._closed and self.last is not None:
             self._finish()
         self._closed = True

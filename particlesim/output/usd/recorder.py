@@ -127,6 +127,5 @@ class UsdRecorder(Recorder):
             frame.number, frame.position, frame.velocity, frame.fields, **frame.changing
         )
 
-    def close(self) -> None:
-        """Give the file the end that was reached."""
+    def _close(self) -> None:
         self.writer.close()
