@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ..output.interrupts import Terminated, terminable
 from ..output.progress import Meter, announced, label
 from .scene_files import load_scene, parse_options, split_options
 
@@ -58,16 +59,18 @@ def opened(debug: bool) -> Iterator[Meter]:
     """
     meter = Meter()
     try:
-        yield meter
+        with terminable():
+            yield meter
     except (typer.Exit, typer.TyperException):
         raise
     except BrokenPipeError:
         # Who reads has what they wanted, as head does. Nothing may be left to flush at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise typer.Exit(0) from None
-    except KeyboardInterrupt:
-        complain(f"interrupted after {meter.done} of {meter.frames} {meter.unit}")
-        raise typer.Exit(130) from None
+    except (KeyboardInterrupt, Terminated) as error:
+        word, code = ("terminated", 143) if isinstance(error, Terminated) else ("interrupted", 130)
+        complain(f"{word} after {meter.done} of {meter.frames} {meter.unit}")
+        raise typer.Exit(code) from None
     except Exception as error:
         if debug:
             traceback.print_exc()

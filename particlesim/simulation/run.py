@@ -11,6 +11,7 @@ from .. import validate
 from ..instruments.watchdog.incident import SimulationError
 from ..output import files
 from ..output.history.writer import SUFFIXES, History
+from ..output.interrupts import Deferred
 from ..output.lock import Lock, lock_path
 from ..output.progress import Meter
 from ..output.recorders import open_recorder
@@ -37,10 +38,14 @@ def run(
             if path is not None and locked.setdefault(lock_path(Path(path)), argument) == argument:
                 stack.enter_context(Lock(OWNER, Path(path), argument))
         if record is not None:
+            interrupts = stack.enter_context(Deferred())
             # First of all: a run that is resumed moves on to its checkpoint.
             recording = stack.enter_context(
-                Recording(sim, frames, record, overwrite=overwrite, resume=resume, **options)
+                Recording(
+                    sim, frames, record, interrupts, overwrite=overwrite, resume=resume, **options
+                )
             )
+            interrupts.check()
         else:
             _refuse_without_record({"resume": resume, **options})
         if history is not None:
@@ -58,6 +63,8 @@ def run(
                 measured.write()
             if callable(progress):
                 progress(sim.frame - first, frames)
+            if recording is not None:
+                recording.interrupts.check()
 
 
 class Recording:
@@ -70,6 +77,7 @@ class Recording:
         sim: The simulation, at the start of the run.
         frames: Of the whole run.
         record: Path of the output.
+        interrupts: What keeps ends that are asked for until a frame is done.
         overwrite: Replace an existing output.
         checkpoint: Frames from one checkpoint to the next, 0 for none; None: by the clock.
         resume: Go on with what is there.
@@ -77,10 +85,11 @@ class Recording:
     """
 
     def __init__(
-        self, sim: Reading, frames: int, record: Any, *, overwrite: bool = False,
-        checkpoint: int | None = None, resume: bool = False, **options: Any,
+        self, sim: Reading, frames: int, record: Any, interrupts: Deferred, *,
+        overwrite: bool = False, checkpoint: int | None = None, resume: bool = False,
+        **options: Any,
     ):  # fmt: skip
-        self.sim, path = sim, Path(record)
+        self.sim, self.interrupts, path = sim, interrupts, Path(record)
         _check(overwrite, checkpoint, resume)
         first, end = sim.frame, sim.frame + frames
         self.checkpoints = None
@@ -133,8 +142,10 @@ class Recording:
         # Finished frames are kept; the first error is the one to see.
         with contextlib.suppress(Exception):
             self.background.close()
-            if isinstance(error, SimulationError) and self.checkpoints is not None:
-                self.checkpoints.capture(self.recorded)()  # of the last good frame
+            # The state is that of the last good frame, or of the one after which an end was asked.
+            whole = isinstance(error, SimulationError) or self.interrupts.acted
+            if whole and self.checkpoints is not None and not self.checkpoints.complete:
+                self.checkpoints.capture(self.recorded)()
         with contextlib.suppress(Exception):
             self.recorder.close()
 

@@ -3,3 +3,10 @@
 ``recorder`` and ``drawing`` say what of a simulation is shown, and ``writing`` puts it into files.
 ``recording`` reads any USD file; ``info``, ``pack`` and ``checking`` are made of it.
 """
+
+from ..interrupts import Deferred
+
+# USD swallows what a handler of signals raises while its libraries are being loaded.
+with Deferred():
+    from pxr import Usd as _Usd  # noqa: F401
+    from pxr import UsdGeom as _UsdGeom
