@@ -15,7 +15,8 @@ from . import files
 
 PATIENCE = 2.0  # for a lock that is being taken or let go of to say whose it is [s]
 PAUSE = 0.01  # between two looks [s]
-SHOWN = 200  # bytes that say who holds a lock
+SPARE = 16384  # bytes that a disk may lose to its blocks and to what leads to a file
+SHOWN = 200  # bytes that say who holds a lock; then comes what is reserved
 
 
 class OutputBusy(BlockingIOError):
@@ -48,7 +49,8 @@ class Lock(files.Closing):
     def __init__(self, owner: str, path: Path, argument: str = "path"):
         files.check_folder(owner, path, argument)
         files.check_writable(owner, path)
-        self.path = lock_path(path)
+        self.owner, self.output, self.path = owner, path, lock_path(path)
+        self._reserved = 0  # bytes
         self._lock = FileLock(self.path, thread_local=False)
         latest = time.monotonic() + PATIENCE
         while not self._taken(owner, path):
@@ -63,6 +65,30 @@ class Lock(files.Closing):
         with contextlib.suppress(OSError):  # it holds without a word too
             self.path.write_text(f"process {os.getpid()} on {socket.gethostname()}\n")
         _remove_unfinished(path)
+
+    def reserve(self, size: int) -> None:
+        """Hold room on the disk for what comes at the end, until :meth:`free`, where that can be.
+
+        Raises:
+            OSError: There is none.
+        """
+        if size <= self._reserved or not hasattr(os, "posix_fallocate"):
+            return
+        room = 2 * size + SPARE  # it may grow: not every time
+        try:
+            with open(self.path, "r+b") as file:
+                os.posix_fallocate(file.fileno(), SHOWN, room)
+        except OSError as error:
+            kept = "What was written before is kept."
+            raise files.unwritable(self.owner, self.output, error, kept) from error
+        self._reserved = room
+
+    def free(self) -> None:
+        """Give back the room that was held. May be called again."""
+        if self._reserved:
+            self._reserved = 0
+            with contextlib.suppress(OSError):
+                os.truncate(self.path, SHOWN)
 
     def close(self) -> None:
         """Let go. May be called again."""

@@ -30,20 +30,26 @@ def run(
     first = sim.frame
     if history is not None:
         files.check_new("History", history, overwrite or resume, suffixes=SUFFIXES)
-    outputs = {"record": record, "history": history}
     with contextlib.ExitStack() as stack:
         recording = measured = None
-        locked: dict[Path, str] = {}
-        for argument, path in outputs.items():
-            if path is not None and locked.setdefault(lock_path(Path(path)), argument) == argument:
-                stack.enter_context(Lock(OWNER, Path(path), argument))
+        locks: dict[Path, Lock] = {}
+        for argument, path in (("record", record), ("history", history)):
+            if path is not None and lock_path(Path(path)) not in locks:
+                lock = stack.enter_context(Lock(OWNER, Path(path), argument))
+                locks[lock.path] = lock
         if record is not None:
             interrupts = stack.enter_context(Deferred())
             # First of all: a run that is resumed moves on to its checkpoint.
             recording = stack.enter_context(
                 Recording(
-                    sim, frames, record, interrupts, overwrite=overwrite, resume=resume, **options
-                )
+                    sim,
+                    frames,
+                    locks[lock_path(Path(record))],
+                    interrupts,
+                    overwrite=overwrite,
+                    resume=resume,
+                    **options,
+                )  # fmt: skip
             )
             interrupts.check()
         else:
@@ -76,7 +82,7 @@ class Recording:
     Args:
         sim: The simulation, at the start of the run.
         frames: Of the whole run.
-        record: Path of the output.
+        lock: Held on the output, whose path it knows.
         interrupts: What keeps ends that are asked for until a frame is done.
         overwrite: Replace an existing output.
         checkpoint: Frames from one checkpoint to the next, 0 for none; None: by the clock.
@@ -85,11 +91,11 @@ class Recording:
     """
 
     def __init__(
-        self, sim: Reading, frames: int, record: Any, interrupts: Deferred, *,
+        self, sim: Reading, frames: int, lock: Lock, interrupts: Deferred, *,
         overwrite: bool = False, checkpoint: int | None = None, resume: bool = False,
         **options: Any,
     ):  # fmt: skip
-        self.sim, self.interrupts, path = sim, interrupts, Path(record)
+        self.sim, self.lock, self.interrupts, path = sim, lock, interrupts, lock.output
         _check(overwrite, checkpoint, resume)
         first, end = sim.frame, sim.frame + frames
         self.checkpoints = None
@@ -121,13 +127,18 @@ class Recording:
         captured = self.recorder.capture()
         if captured is not None:
             self.recorded = captured.number
-            self.background.put(lambda: self.recorder.write_frame(captured))
+            self.background.put(lambda: self._write(captured))
         if self.checkpoints is not None and self.checkpoints.due():
             self.background.put(self.checkpoints.capture(self.recorded))
+
+    def _write(self, captured: Any) -> None:
+        self.recorder.write_frame(captured)
+        self.lock.reserve(self.recorder.rest)
 
     def close(self) -> None:
         """Write what has been captured, the end of the output, and the state to go on from."""
         self.background.close()
+        self.lock.free()
         self.recorder.close()
         if self.checkpoints is not None and not self.checkpoints.complete:
             self.checkpoints.capture(self.recorded)()
@@ -146,6 +157,7 @@ class Recording:
             whole = isinstance(error, SimulationError) or self.interrupts.acted
             if whole and self.checkpoints is not None and not self.checkpoints.complete:
                 self.checkpoints.capture(self.recorded)()
+        self.lock.free()  # there may be no other room
         with contextlib.suppress(Exception):
             self.recorder.close()
 

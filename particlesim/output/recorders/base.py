@@ -71,6 +71,11 @@ class Recorder(files.Closing):
             self.locked = True
         self._write(frame)
 
+    @property
+    def rest(self) -> int:
+        """How much room :meth:`close` needs on the disk, as far as can be told [bytes]."""
+        return 0
+
     def close(self) -> None:
         """Write what has to come at the end. May be called again."""
         try:

@@ -59,6 +59,11 @@ class VtkhdfRecorder(FolderRecorder):
         if time.perf_counter() >= self._next_series:
             self._publish_series()
 
+    @property
+    def rest(self) -> int:
+        shown = self.path.stat().st_size
+        return shown * len(self._counts) // max(1, self._shown)
+
     def _finish(self) -> None:
         if self._shown != len(self._counts):
             self._publish_series()

@@ -4,9 +4,10 @@
 ``recording`` reads any USD file; ``info``, ``pack`` and ``checking`` are made of it.
 """
 
+import importlib
+
 from ..interrupts import Deferred
 
 # USD swallows what a handler of signals raises while its libraries are being loaded.
 with Deferred():
-    from pxr import Usd as _Usd  # noqa: F401
-    from pxr import UsdGeom as _UsdGeom
+    importlib.import_module("pxr.UsdGeom")
