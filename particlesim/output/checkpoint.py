@@ -191,6 +191,7 @@ def write(capture: Capture, path: Path) -> None:
     arrays = {HEADER: np.frombuffer(text, np.uint8), **capture.arrays}
     with files.whole("Simulation.save", path, "What was saved before is kept.") as temporary:
         files.write_arrays(temporary, arrays, sync=True)
+    files.sync([path])
 
 
 def read(source: Path) -> Capture:

@@ -158,6 +158,22 @@ def write_arrays(path: Path, arrays: Mapping[str, Any], *, sync: bool = False) -
             os.fsync(file.fileno())
 
 
+def sync(paths: Iterable[Path]) -> None:
+    """Return only when the disk has these files, those that exist, and their names.
+
+    Raises:
+        OSError: It cannot take them.
+    """
+    paths = list(paths)
+    folders = {path.parent for path in paths} if hasattr(os, "O_DIRECTORY") else set()
+    for path in (*filter(Path.is_file, paths), *folders):
+        opened = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(opened)
+        finally:
+            os.close(opened)
+
+
 class Closing(ABC):
     """Something to be closed at the end of a ``with``; of several errors the first is raised."""
 

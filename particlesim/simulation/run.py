@@ -39,18 +39,10 @@ def run(
                 locks[lock.path] = lock
         if record is not None:
             interrupts = stack.enter_context(Deferred())
+            options = {"overwrite": overwrite, "resume": resume, **options}
+            lock = locks[lock_path(Path(record))]
             # First of all: a run that is resumed moves on to its checkpoint.
-            recording = stack.enter_context(
-                Recording(
-                    sim,
-                    frames,
-                    locks[lock_path(Path(record))],
-                    interrupts,
-                    overwrite=overwrite,
-                    resume=resume,
-                    **options,
-                )  # fmt: skip
-            )
+            recording = stack.enter_context(Recording(sim, frames, lock, interrupts, **options))
             interrupts.check()
         else:
             _refuse_without_record({"resume": resume, **options})
@@ -129,11 +121,15 @@ class Recording:
             self.recorded = captured.number
             self.background.put(lambda: self._write(captured))
         if self.checkpoints is not None and self.checkpoints.due():
-            self.background.put(self.checkpoints.capture(self.recorded))
+            self.background.put(self._checkpoint())
 
     def _write(self, captured: Any) -> None:
         self.recorder.write_frame(captured)
         self.lock.reserve(self.recorder.rest)
+
+    def _checkpoint(self) -> Callable[[], None]:
+        assert self.checkpoints is not None
+        return self.checkpoints.capture(self.recorded, self.recorder.sync)
 
     def close(self) -> None:
         """Write what has been captured, the end of the output, and the state to go on from."""
@@ -141,7 +137,7 @@ class Recording:
         self.lock.free()
         self.recorder.close()
         if self.checkpoints is not None and not self.checkpoints.complete:
-            self.checkpoints.capture(self.recorded)()
+            self._checkpoint()()
 
     def __enter__(self) -> Self:
         return self
@@ -156,7 +152,7 @@ class Recording:
             # The state is that of the last good frame, or of the one after which an end was asked.
             whole = isinstance(error, SimulationError) or self.interrupts.acted
             if whole and self.checkpoints is not None and not self.checkpoints.complete:
-                self.checkpoints.capture(self.recorded)()
+                self._checkpoint()()
         self.lock.free()  # there may be no other room
         with contextlib.suppress(Exception):
             self.recorder.close()

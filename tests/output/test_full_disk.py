@@ -50,7 +50,7 @@ def test_room_is_held_and_given_back(disk):
         assert used() > 100_000
         lock.reserve(60_000)  # there is room for that
         assert used() < 120_000
-        with pytest.raises(OSError, match="Test: .*out.usda' must be writable, got .*No space"):
+        with pytest.raises(OSError, match=r"Test: .*out\.usda' must be writable, got .*No space"):
             lock.reserve(300_000)
         lock.free()
         assert used() < 20_000 and lock.path.read_bytes().startswith(b"process ")

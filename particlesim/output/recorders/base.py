@@ -42,6 +42,7 @@ class Recorder(files.Closing):
         self.every = validate.whole(self.owner, "every", every, minimum=1)
         self.planned_last = (sim.frame + validate.whole(self.owner, "frames", frames)) // every
         self.fields = ParticleFields(sim, fields)
+        self._unsynced: dict[Path, None] = {}  # in order
         self.locked = False  # by whoever writes through this recorder, or by itself
         self._lock: Lock | None = None
 
@@ -70,6 +71,23 @@ class Recorder(files.Closing):
             self._lock = Lock(self.owner, self.path)
             self.locked = True
         self._write(frame)
+        self._unsynced.update(dict.fromkeys(self.files_of(frame.number)))
+
+    def sync(self) -> None:
+        """Return only when the disk has all frames, so that they outlive a loss of power.
+
+        Raises:
+            OSError: It cannot take them.
+        """
+        try:
+            files.sync(self._unsynced)
+        except OSError as error:
+            raise files.unwritable(self.owner, self.path, error, KEPT) from error
+        self._unsynced.clear()
+
+    @abstractmethod
+    def files_of(self, number: int) -> list[Path]:
+        """The files that hold a frame, and those that lead to it."""
 
     @property
     def rest(self) -> int:

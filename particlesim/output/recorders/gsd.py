@@ -55,6 +55,9 @@ class GsdRecorder(ParticleRecorder):
         self._box = self._whole_box()
         self._mass = self.sim.model.column("mass")
 
+    def files_of(self, number: int) -> list[Path]:
+        return [self.path]
+
     def _begin(self, frame: ParticleFrame) -> None:
         # Prepared under another name, since an empty file is not a trajectory.
         with files.whole(self.owner, self.path, KEPT) as temporary:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from ...engine.loop import Source
 from ..fields import ParticleColors
 from ..recorders.base import Recorder
 from .drawing import Drawing
+from .layout import MANIFEST, clip_file
 from .writing.writer import UsdWriter
 
 
@@ -126,6 +128,10 @@ class UsdRecorder(Recorder):
         self.writer.write(
             frame.number, frame.position, frame.velocity, frame.fields, **frame.changing
         )
+
+    def files_of(self, number: int) -> list[Path]:
+        clips = self.writer.clips
+        return [clip_file(clips, number), clips / MANIFEST, self.path]
 
     @property
     def rest(self) -> int:
