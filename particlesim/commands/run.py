@@ -26,6 +26,7 @@ from .shell import (
     load,
     opened,
     simulation,
+    start_warp,
     wanted_frames,
 )
 
@@ -115,7 +116,8 @@ def run(
     """
     with opened(debug) as meter:
         _check_output(out, overwrite, resume)
-        _check_places(out, history)
+        start_warp(debug)
+        _check_places(out, history, overwrite or resume)
         module = load(scene, debug)
         sim = simulation(
             module, options, device, worlds, precision=precision, substeps=substeps, ledger=ledger
@@ -223,10 +225,17 @@ def _steps(layout: str | None) -> Any:
     return steps
 
 
-def _check_places(out: Path | None, history: Path | None) -> None:
+def _check_places(out: Path | None, history: Path | None, may_exist: bool) -> None:
     """Refuse, before anything is loaded, what cannot be written or somebody else is writing."""
+    from ..output.files import check_new
+    from ..output.history.writer import SUFFIXES
     from ..output.lock import Lock
+    from ..output.recorders import recorder_class
 
+    if out is not None:
+        recorder_class(out)
+    if history is not None:
+        check_new("run", history, may_exist, suffixes=SUFFIXES, argument="--history")
     for option, path in (("--out", out), ("--history", history)):
         if path is not None:
             Lock("run", path, option).close()

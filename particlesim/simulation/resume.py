@@ -2,8 +2,9 @@
 
 ``out.checkpoint.npz`` is there from before the first frame on. First it holds only what the run was
 started with; then, now and again, the state too. Frames come before the checkpoint that follows
-them, on the disk itself, so that all frames up to a checkpoint are whole after a loss of power too. A run is resumed by calling it as it
-was called, with ``resume=True``: what was given is compared with what is kept, bit by bit.
+them, onto the disk itself, so that all frames up to a checkpoint are whole, after a loss of power
+too. A run is resumed by calling it as it was called, with ``resume=True``: what was given is
+compared with what is kept, bit by bit.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from ..output.history.writer import SUFFIXES, History
 from ..output.interrupts import Deferred
 from ..output.lock import Lock, lock_path
 from ..output.progress import Meter
-from ..output.recorders import open_recorder
+from ..output.recorders import open_recorder, recorder_class
 from ..output.recorders.background import BackgroundWriter
 from ..output.recorders.base import Recorder
 from .reading import Reading
@@ -28,6 +28,9 @@ def run(
 ) -> None:  # fmt: skip
     """Advance by ``frames`` frames (see :meth:`Simulation.run`)."""
     first = sim.frame
+    # What cannot be is told before anything is made.
+    if record is not None:
+        recorder_class(record)
     if history is not None:
         files.check_new("History", history, overwrite or resume, suffixes=SUFFIXES)
     with contextlib.ExitStack() as stack:

@@ -33,6 +33,8 @@ class Recorder(files.Closing):
         every: Record every k-th frame of the simulation; recorded frames count one by one.
     """
 
+    needs: tuple[str, str] | None = None  # a module, and the extra that installs it
+
     def __init__(
         self, sim: Source, path: str | os.PathLike[str], frames: int, fields: Iterable[str],
         every: int,
@@ -45,6 +47,15 @@ class Recorder(files.Closing):
         self._unsynced: dict[Path, None] = {}  # in order
         self.locked = False  # by whoever writes through this recorder, or by itself
         self._lock: Lock | None = None
+
+    @classmethod
+    def library(cls) -> Any:
+        """The module that the format needs, None for none.
+
+        Raises:
+            ImportError: It is not installed; the message names the extra.
+        """
+        return None if cls.needs is None else validate.installed(cls.__name__, *cls.needs)
 
     def write(self) -> None:
         """Write the simulation's present state as its present frame, if that is to be recorded."""

@@ -18,7 +18,6 @@ from typing import Any, Self
 
 import numpy as np
 
-from ... import validate
 from .. import files
 from .base import KEPT, ParticleFrame, ParticleRecorder
 
@@ -45,10 +44,10 @@ class GsdRecorder(ParticleRecorder):
     Arguments are those of :class:`~particlesim.output.recorders.base.ParticleRecorder`.
     """
 
-    suffix = ".gsd"
+    suffix, needs = ".gsd", ("gsd.hoomd", "gsd")
 
     def __init__(self, *arguments: Any, **options: Any):
-        self._library = validate.installed(self.__class__.__name__, "gsd.hoomd", "gsd")
+        self._library = self.library()
         self._open: Any = None
         self._first = 0
         super().__init__(*arguments, **options)
