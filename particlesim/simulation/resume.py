@@ -90,7 +90,7 @@ class Checkpoints:
             )  # fmt: skip
         self._compare(saved.header)
         if saved.arrays:
-            checkpoint.restore(self.sim.frames, self.sim.watchdog, saved, self.path)
+            checkpoint.restore(self.sim.frames, self.sim.watchdog, saved)
             self._captured = self.sim.frame
         return saved.header["run"]["recorded"]
 
