@@ -120,9 +120,17 @@ def start_warp(debug: bool) -> None:
     The latter is printed by its C code past every log level, so it is taken out of the stream.
     ``debug``: let it say what it says.
     """
+    try:
+        _init_warp(debug)
+    except OSError as error:
+        raise OSError(_no_cache(error)) from error
+
+
+def _init_warp(debug: bool) -> None:
     import warp
 
     if debug:
+        warp.init()
         return
     warp.config.log_level = warp.LOG_WARNING
     stream = os.dup(2)
@@ -139,7 +147,24 @@ def start_warp(debug: bool) -> None:
                 typer.echo(line, err=True)
 
 
+def _no_cache(error: OSError) -> str:
+    """What to do where Warp cannot keep its kernels."""
+    return (
+        f"Warp: kernel cache must be in a folder that can be written, got {error}; set "
+        "WARP_CACHE_PATH to another."
+    )
+
+
+def _in_cache(path: str) -> bool:
+    """Whether a file is one of Warp's; asks Warp only if it has been started."""
+    warp = sys.modules.get("warp")
+    folder = None if warp is None else warp.config.kernel_cache_dir
+    return folder is not None and os.path.abspath(path).startswith(os.path.abspath(folder) + os.sep)
+
+
 def describe(error: Exception) -> str:
+    if isinstance(error, OSError) and _in_cache(str(error.filename)):
+        return _no_cache(error)
     if isinstance(error, OSError) and error.filename and error.strerror:
         return f"{error.filename}: {error.strerror}"
     if isinstance(error, ValueError | OSError | RuntimeError) and str(error):

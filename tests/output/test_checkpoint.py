@@ -63,7 +63,7 @@ def test_worlds(integrator, precision, device, tmp_path, liquid):
     sim = ps.Simulation(scenes(), settings, device=device)
     sim.run(2)
     sim.reset([1])  # its forces are not known
-    sim.world(2).velocity = 0.1
+    sim.world(2).velocity = (0.1, 0.1, 0.1)
     assert sim.loop.unknown_forces >= {1, 2}
     restart(sim, tmp_path / "run.npz", scenes())
 
@@ -79,7 +79,7 @@ def test_copies_need_no_count(device, tmp_path, refused):
 
 def test_what_was_set_from_outside_is_kept(device, tmp_path):
     sim = ps.Simulation(pair(), ps.Settings(integrator="velocity_verlet"), device=device)
-    sim.diagnostics()  # makes the array of masses
+    sim.state.require(["mass"])
     sim.set("mass", [2.0, 3.0])
     sim.run(2)
     loaded = restart(sim, tmp_path / "run.npz", pair())
