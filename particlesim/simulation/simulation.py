@@ -148,8 +148,8 @@ class Simulation(Reading):
         warn_if_past(self.loop)
         run(
             self, self.step, frames, record=record, progress=progress, history=history,
-            overwrite=overwrite, checkpoint=checkpoint, resume=resume, fields=tuple(fields),
-            **options,
+            overwrite=overwrite, checkpoint=checkpoint, resume=resume,
+            fields=(fields,) if isinstance(fields, str) else tuple(fields), **options,
         )  # fmt: skip
 
     def project(self, iterations: int) -> None:

@@ -5,6 +5,7 @@ import sys
 import pytest
 
 from particlesim import cli
+from particlesim.output.recorders import recorder_class
 
 from .runs import sim
 
@@ -64,3 +65,12 @@ def test_histories_from_the_command_line(tmp_path, capsys):
     assert "--history must be a new file" in capsys.readouterr().err
     assert cli.main(["run", str(scene), "--history", str(old), "--overwrite"]) == 1
     assert "loaded" in capsys.readouterr().err and old.read_text() == "mine"
+
+
+def test_fields_are_named_by_who_writes_them(suffix, tmp_path, refused):
+    path = tmp_path / f"out{suffix}"
+    with refused(f"^{recorder_class(path).__name__}: field must be .*, got 'image'"):
+        sim().run(1, record=path, fields=["image"])
+    assert list(tmp_path.iterdir()) == []
+    sim().run(1, record=path, fields="speed")
+    assert path.with_suffix(".checkpoint.npz").exists()

@@ -43,7 +43,7 @@ class Recorder(files.Closing):
         self.sim, self.path = sim, Path(path)
         self.every = validate.whole(self.owner, "every", every, minimum=1)
         self.planned_last = (sim.frame + validate.whole(self.owner, "frames", frames)) // every
-        self.fields = ParticleFields(sim, fields)
+        self.fields = ParticleFields(sim, fields, self.owner)
         self._unsynced: dict[Path, None] = {}  # in order
         self.locked = False  # by whoever writes through this recorder, or by itself
         self._lock: Lock | None = None
