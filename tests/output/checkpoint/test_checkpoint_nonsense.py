@@ -10,7 +10,7 @@ import pytest
 import particlesim as ps
 
 from .checkpoints import pair
-from .runs import sim
+from ..runs import sim
 
 
 @pytest.fixture
