@@ -9,8 +9,8 @@ import pytest
 
 import particlesim as ps
 
-from .checkpoints import pair
 from ..runs import sim
+from .checkpoints import pair
 
 
 @pytest.fixture
