@@ -1,7 +1,8 @@
 """The command line: list, run, measure and show scenes (see :mod:`particlesim.commands`).
 
-Exit codes: 0 done, 1 a run that failed, 2 arguments that do not fit, 130 interrupted. Whatever goes
-wrong is one line on stderr. Warp and USD are imported only when a scene is, so that help is quick.
+Exit codes: 0 done, 1 a run that failed, 2 arguments that do not fit, 130 interrupted, 143
+terminated. Whatever goes wrong is one line on stderr. Warp and USD are imported only when a scene
+is, so that help is quick.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from ..output import files
-from ..output.progress import label
+from ..output.progress import announced, label
 from .scene_files import ready_scenes
 from .shell import (
     USD,
@@ -27,6 +27,7 @@ from .shell import (
     load,
     opened,
     simulation,
+    start_warp,
     wanted_frames,
 )
 
@@ -116,6 +117,9 @@ def run(
     """
     with opened(debug) as meter:
         _check_output(out, overwrite, resume)
+        with announced(f"{scene}: loading"):
+            start_warp(debug)
+            _check_places(out, history, overwrite or resume)
         module = load(scene, debug)
         sim = simulation(
             module, options, device, worlds, precision=precision, substeps=substeps, ledger=ledger
@@ -223,6 +227,22 @@ def _steps(layout: str | None) -> Any:
     if len(steps) != 3:
         raise ValueError(f"--layout must be grid or three numbers, got {layout!r}; write 2,0,0.")
     return steps
+
+
+def _check_places(out: Path | None, history: Path | None, may_exist: bool) -> None:
+    """Refuse, before anything is loaded, what cannot be written or somebody else is writing."""
+    from ..output.files import check_new
+    from ..output.history.writer import SUFFIXES
+    from ..output.lock import Lock
+    from ..output.recorders import recorder_class
+
+    if out is not None:
+        recorder_class(out)
+    if history is not None:
+        check_new("run", history, may_exist, suffixes=SUFFIXES, argument="--history")
+    for option, path in (("--out", out), ("--history", history)):
+        if path is not None:
+            Lock("run", path, option).close()
 
 
 def _check_output(out: Path | None, overwrite: bool, resume: bool) -> None:

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ..output.interrupts import Terminated, terminable
 from ..output.progress import Meter, announced, label
 from .scene_files import load_scene, parse_options, split_options
 
@@ -57,16 +58,18 @@ def opened(debug: bool) -> Iterator[Meter]:
     """
     meter = Meter()
     try:
-        yield meter
+        with terminable():
+            yield meter
     except (typer.Exit, typer.TyperException):
         raise
     except BrokenPipeError:
         # Who reads has what they wanted, as head does. Nothing may be left to flush at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise typer.Exit(0) from None
-    except KeyboardInterrupt:
-        complain(f"interrupted after {meter.done} of {meter.frames} {meter.unit}")
-        raise typer.Exit(130) from None
+    except (KeyboardInterrupt, Terminated) as error:
+        word, code = ("terminated", 143) if isinstance(error, Terminated) else ("interrupted", 130)
+        complain(f"{word} after {meter.done} of {meter.frames} {meter.unit}")
+        raise typer.Exit(code) from None
     except Exception as error:
         if debug:
             traceback.print_exc()
@@ -78,10 +81,18 @@ def opened(debug: bool) -> Iterator[Meter]:
 def load(name: str, debug: bool) -> ModuleType:
     """The module of a scene; Warp is started for it."""
     with announced(f"{name}: loading"):
-        from ..engine.start import start_warp
-
         start_warp(debug)
         return load_scene(name)
+
+
+def start_warp(debug: bool) -> None:
+    """Start Warp quietly; where it cannot keep its kernels, the error says what to set."""
+    from ..engine.start import start_warp as start
+
+    try:
+        start(debug)
+    except OSError as error:
+        raise OSError(_no_cache(error)) from error
 
 
 def simulation(
@@ -112,7 +123,24 @@ def wanted_frames(module: ModuleType, frames: int | None) -> int:
     return getattr(module, "frames", DEFAULT_FRAMES) if frames is None else frames
 
 
+def _no_cache(error: OSError) -> str:
+    """What to do where Warp cannot keep its kernels."""
+    return (
+        f"Warp: kernel cache must be in a folder that can be written, got {error}; set "
+        "WARP_CACHE_PATH to another."
+    )
+
+
+def _in_cache(path: str) -> bool:
+    """Whether a file is one of Warp's; asks Warp only if it has been started."""
+    warp = sys.modules.get("warp")
+    folder = None if warp is None else warp.config.kernel_cache_dir
+    return folder is not None and os.path.abspath(path).startswith(os.path.abspath(folder) + os.sep)
+
+
 def describe(error: Exception) -> str:
+    if isinstance(error, OSError) and _in_cache(str(error.filename)):
+        return _no_cache(error)
     if isinstance(error, OSError) and error.filename and error.strerror:
         return f"{error.filename}: {error.strerror}"
     if isinstance(error, ValueError | OSError | RuntimeError) and str(error):

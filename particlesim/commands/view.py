@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import os
-import signal
 import sys
 import threading
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from .. import validate
+from ..output.interrupts import Terminated
 from .shell import (
     USD,
     Color,
@@ -84,8 +84,7 @@ def _show(
     if validate.whole(OWNER, "port", port) > PORTS:
         raise validate.fail(OWNER, "port", f"be at most {PORTS}", port, "choose a smaller one")
     with contextlib.ExitStack() as stack:
-        stack.enter_context(_stopped_by_terminate())
-        stack.enter_context(contextlib.suppress(KeyboardInterrupt))
+        stack.enter_context(contextlib.suppress(KeyboardInterrupt, Terminated))
         source = _source(name, color, simulate)
         if isinstance(source, Live):
             stack.callback(source.close)
@@ -123,17 +122,3 @@ def _has_display() -> bool:
     if sys.platform in ("win32", "darwin"):
         return True
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
-@contextlib.contextmanager
-def _stopped_by_terminate() -> Iterator[None]:
-    """Let SIGTERM end what is below as Ctrl+C does, so that nothing is left behind."""
-
-    def interrupt(*_: Any) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

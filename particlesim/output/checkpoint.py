@@ -9,12 +9,11 @@ run in the same order and a restart equals the run that was not interrupted, bit
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
-import io
 import json
 import os
-import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +29,11 @@ from ..scene.fingerprint import difference, fingerprint
 from ..scene.scene import Scene
 from ..scene.settings import INTEGRATORS, Settings
 from . import files
+from .archive import Stored, is_whole, opened
 
+LOAD = "Simulation.load"
 FORMAT, VERSION = "particlesim checkpoint", 1
+MOST = 2**53  # frames: beyond, their times are not exact
 HEADER = "header"
 # What the arrays mean depends on these: which there are, their type, and the time of a frame.
 FIXED = ("dt", "integrator", "precision", "compensated", "ledger")
@@ -43,6 +45,15 @@ class Capture:
 
     header: dict[str, Any]
     arrays: dict[str, np.ndarray]
+
+
+@dataclasses.dataclass(frozen=True)
+class Saved:
+    """A checkpoint in a file: its header, and what its arrays are."""
+
+    source: Path
+    header: dict[str, Any]
+    arrays: dict[str, Stored]
 
 
 def save(frames: Frames, watchdog: Watchdog, path: str | os.PathLike[str], overwrite: bool) -> None:
@@ -81,10 +92,14 @@ def capture(
     return Capture(header, arrays)
 
 
-def restore(frames: Frames, watchdog: Watchdog, saved: Capture, source: Path) -> None:
-    """Put a loop, of the same scenes and settings, to where a checkpoint was captured."""
+def restore(frames: Frames, watchdog: Watchdog, saved: Saved) -> None:
+    """Put a loop, of the same scenes and settings, to where a checkpoint was captured.
+
+    Raises:
+        ValueError: The arrays are damaged, or not those of the loop; it is as it was.
+    """
     loop = frames.loop
-    _fill(frames, saved.arrays, source)
+    _fill(frames, saved)
     loop.frame = saved.header["frame"]
     loop.unknown_forces = set(saved.header["unknown_forces"])
     watchdog.incidents = [Incident.of_saved(each) for each in saved.header.get("incidents", ())]
@@ -92,17 +107,16 @@ def restore(frames: Frames, watchdog: Watchdog, saved: Capture, source: Path) ->
 
 
 def check(
-    saved: Capture,
-    source: Path,
+    saved: Saved,
     scene: Scene | Sequence[Scene],
     settings: Settings | None,
     worlds: int | None,
 ) -> tuple[list[Scene], Settings]:
     """The scenes and settings to go on with from a file (see :meth:`Simulation.load`)."""
-    header = saved.header
+    source, header = saved.source, saved.header
     if not saved.arrays:
         raise validate.fail(
-            "Simulation.load", "path", "be a checkpoint with a state", str(source),
+            LOAD, "path", "be a checkpoint with a state", str(source),
             "this one says only how a run was started; start it anew",
         )  # fmt: skip
     if isinstance(scene, Scene) and worlds is None and header["copies"]:
@@ -112,9 +126,12 @@ def check(
     if found:
         where, before, given = found
         raise validate.fail(
-            "Simulation.load", where, f"be as in {source.name!r}, {_short(before)}", given,
+            LOAD, where, f"be as in {source.name!r}, {_short(before)}", given,
             "give the scenes that were saved",
         )  # fmt: skip
+    rows = saved.arrays["state/position"].shape[:1]
+    if rows != (sum(each.particle_count for each in scenes),):  # before so many worlds are made
+        raise _unfit(source, f"has positions {rows} in {len(scenes)} worlds")
     return scenes, _settings(source, header["settings"], settings)
 
 
@@ -132,7 +149,7 @@ def _settings(source: Path, saved: dict[str, Any], given: Settings | None) -> Se
         saved = {**saved, "integrator": method}
     elif saved["integrator"] not in INTEGRATORS:
         raise validate.fail(
-            "Simulation.load", "settings.integrator",
+            LOAD, "settings.integrator",
             f"be the {saved['integrator']} of {source.name!r}", method,
             "give settings with that class",
         )  # fmt: skip
@@ -145,14 +162,15 @@ def _settings(source: Path, saved: dict[str, Any], given: Settings | None) -> Se
         before, now = getattr(settings, name), getattr(given, name)
         if now != before:
             raise validate.fail(
-                "Simulation.load", f"settings.{name}", f"be {before!r} as in {source.name!r}", now,
+                LOAD, f"settings.{name}", f"be {before!r} as in {source.name!r}", now,
                 f"change other knobs than {', '.join(FIXED)}",
             )  # fmt: skip
     return given
 
 
-def _fill(frames: Frames, arrays: dict[str, np.ndarray], source: Path) -> None:
+def _fill(frames: Frames, saved: Saved) -> None:
     """Put the arrays of a file into a loop that is at its start."""
+    source, arrays = saved.source, saved.arrays
     # Some arrays are made only when something asks for them, as the diagnostics do.
     prefix = "state/"
     frames.loop.state.require(
@@ -167,7 +185,10 @@ def _fill(frames: Frames, arrays: dict[str, np.ndarray], source: Path) -> None:
             raise _unfit(
                 source, f"has {there.dtype} {there.shape} for {here.dtype} {here.shape} in {name}"
             )
-        target.assign(there)
+    with _whole(source):
+        read = {name: there.read() for name, there in arrays.items()}  # all, before one is changed
+    for name, target in targets.items():
+        target.assign(read[name])
     for each in frames.loop.neighbors.verlet:
         each.mark_all()
         each.rebuild()
@@ -191,46 +212,75 @@ def write(capture: Capture, path: Path) -> None:
     arrays = {HEADER: np.frombuffer(text, np.uint8), **capture.arrays}
     with files.whole("Simulation.save", path, "What was saved before is kept.") as temporary:
         files.write_arrays(temporary, arrays, sync=True)
+    files.sync([path])
 
 
-def read(source: Path) -> Capture:
-    """What a file holds, every byte of it checked.
+def read(source: Path) -> Saved:
+    """What a file holds, its header checked; of its arrays only what they are.
 
     Raises:
         ValueError: It is damaged, newer or no checkpoint. OSError: It cannot be read.
     """
-    owner = "Simulation.load"
     try:
-        file = open(source, "rb")  # noqa: SIM115, what fails within is told apart
+        open(source, "rb").close()
     except OSError as error:
         raise type(error)(
-            f"{owner}: path must be a file that can be read, got {str(source)!r} "
+            f"{LOAD}: path must be a file that can be read, got {str(source)!r} "
             f"({error.strerror}); check the path."
         ) from error
-    with file:
-        try:
-            with zipfile.ZipFile(file) as archive:
-                header = json.loads(_entry(archive, f"{HEADER}.npy").tobytes())
-                if header["format"] != FORMAT:
-                    raise ValueError(f"format {header['format']!r}")
-                if header["format_version"] <= VERSION:
-                    names = header["arrays"]
-                    return Capture(header, {name: _entry(archive, f"{name}.npy") for name in names})
-        except Exception as error:  # bytes may be anything, and their readers raise as much
-            raise ValueError(
-                f"{owner}: path must be a whole checkpoint written by Simulation.save, got "
-                f"{str(source)!r} ({type(error).__name__}: {error}); take another file."
-            ) from error
+    with _whole(source), opened(source) as file:
+        header = json.loads(Stored.find(file, HEADER).read().tobytes())
+        if header["format"] != FORMAT:
+            raise ValueError(f"format {header['format']!r}")
+        if header["format_version"] <= VERSION:
+            _check_header(header)
+            return Saved(
+                source, header, {name: Stored.find(file, name) for name in header["arrays"]}
+            )
     raise ValueError(
-        f"{owner}: path must be a checkpoint of format {VERSION} or older, got format "
+        f"{LOAD}: path must be a checkpoint of format {VERSION} or older, got format "
         f"{header['format_version']} in {str(source)!r}; use particlesim "
         f"{header.get('particlesim')} or newer."
     )
 
 
-def _entry(archive: zipfile.ZipFile, name: str) -> np.ndarray:
-    """An array of the archive; reading it to its end has its checksum compared."""
-    return np.lib.format.read_array(io.BytesIO(archive.read(name)), allow_pickle=False)
+@contextlib.contextmanager
+def _whole(source: Path) -> Iterator[None]:
+    """Say of whatever goes wrong that the file is not whole."""
+    try:
+        yield
+    except Exception as error:  # bytes may be anything, and their readers raise as much
+        raise ValueError(
+            f"{LOAD}: path must be a whole checkpoint written by Simulation.save, got "
+            f"{str(source)!r} ({type(error).__name__}: {error}); take another file."
+        ) from error
+
+
+def _check_header(header: dict[str, Any]) -> None:
+    """Refuse numbers that no simulation has.
+
+    Raises:
+        Exception: Something is missing, or of another kind.
+    """
+    kinds, worlds = header["scenes"]["kinds"], header["scenes"]["worlds"]
+    frame, run = header["frame"], header.get("run", {"recorded": None, "arguments": {}})
+    incidents = [Incident.of_saved(each) for each in header.get("incidents", ())]
+    names, recorded = header["arrays"], run["recorded"]
+    sound = {
+        "frame": is_whole(frame, MOST),
+        "scenes": bool(worlds) and all(is_whole(kind, len(kinds)) for kind in worlds),
+        "frozen": all(is_whole(world, len(worlds)) for world in header.get("frozen", ())),
+        "unknown_forces": all(is_whole(world, len(worlds)) for world in header["unknown_forces"]),
+        "incidents": all(is_whole(each.world, len(worlds)) for each in incidents),
+        "settings": isinstance(header["settings"], dict),
+        "copies": isinstance(header["copies"], bool),
+        "arrays": len(set(names)) == len(names) and all(isinstance(each, str) for each in names),
+        "run": isinstance(run["arguments"], dict)
+        and (recorded is None or is_whole(recorded, frame + 1)),
+    }
+    for name, right in sound.items():
+        if not right:
+            raise ValueError(f"{name} {_short(header[name])}")
 
 
 def _short(value: Any) -> str:

@@ -28,16 +28,17 @@ class ParticleFields:
     Args:
         sim: The simulation.
         names: What to read.
+        owner: Whom an error names.
 
     Raises:
         ValueError: A name that the simulation has no such values for.
     """
 
-    def __init__(self, sim: Source, names: Iterable[str]):
+    def __init__(self, sim: Source, names: Iterable[str], owner: str = OWNER):
         self.sim = sim
         self.names = list(dict.fromkeys([names] if isinstance(names, str) else names))
         for name in self.names:
-            validate.choice(OWNER, "field", name, readable(sim))
+            validate.choice(owner, "field", name, readable(sim))
         self.fluids: list[tuple[SPH, np.ndarray]] = []
         if OF_THE_FLUID & set(self.names):
             self.fluids = [

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
+import secrets
+import tempfile
 import zipfile
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -53,11 +55,7 @@ def check_new(
     target, shown = Path(path), str(path)
     if suffixes and target.suffix.lower() not in suffixes:
         raise validate.fail(owner, argument, f"end in {', '.join(suffixes)}", shown, "name it so")
-    if not target.parent.is_dir():
-        raise FileNotFoundError(
-            f"{owner}: {argument} must be in an existing folder, got {shown!r}; "
-            f"make {str(target.parent)!r} first."
-        )
+    check_folder(owner, target, argument)
     if target.is_dir():
         raise IsADirectoryError(
             f"{owner}: {argument} must be a file, got the folder {shown!r}; choose another name."
@@ -69,6 +67,31 @@ def check_new(
             f"exists; choose another, or {consent}."
         )
     return target
+
+
+def check_folder(owner: str, target: Path, argument: str = "path") -> None:
+    """Refuse a file in a folder that does not exist.
+
+    Raises:
+        FileNotFoundError: It does not.
+    """
+    if not target.parent.is_dir():
+        raise FileNotFoundError(
+            f"{owner}: {argument} must be in an existing folder, got {str(target)!r}; "
+            f"make {str(target.parent)!r} first."
+        )
+
+
+def check_writable(owner: str, target: Path, remedy: str = "choose another folder") -> None:
+    """Refuse a file in a folder that takes none; tried, since permissions do not say it all.
+
+    Raises:
+        OSError: No file can be made there.
+    """
+    try:
+        tempfile.TemporaryFile(dir=target.parent).close()
+    except OSError as error:
+        raise unwritable(owner, target, error, remedy=remedy) from error
 
 
 @contextlib.contextmanager
@@ -83,7 +106,7 @@ def whole(owner: str, target: Path, kept: str = "") -> Iterator[Path]:
     Raises:
         OSError: The file could not be written; the temporary one is gone, the old one stands.
     """
-    temporary = target.with_name(f"{target.stem}.tmp{target.suffix}")
+    temporary = target.with_name(f"{target.stem}.{secrets.token_hex(4)}.tmp{target.suffix}")
     try:
         yield temporary
         os.replace(temporary, target)
@@ -133,6 +156,22 @@ def write_arrays(path: Path, arrays: Mapping[str, Any], *, sync: bool = False) -
         file.flush()
         if sync:
             os.fsync(file.fileno())
+
+
+def sync(paths: Iterable[Path]) -> None:
+    """Return only when the disk has these files, those that exist, and their names.
+
+    Raises:
+        OSError: It cannot take them.
+    """
+    paths = list(paths)
+    folders = {path.parent for path in paths} if hasattr(os, "O_DIRECTORY") else set()
+    for path in (*filter(Path.is_file, paths), *folders):
+        opened = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(opened)
+        finally:
+            os.close(opened)
 
 
 class Closing(ABC):

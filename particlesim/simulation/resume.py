@@ -2,8 +2,9 @@
 
 ``out.checkpoint.npz`` is there from before the first frame on. First it holds only what the run was
 started with; then, now and again, the state too. Frames come before the checkpoint that follows
-them, so that all frames up to a checkpoint are whole on disk. A run is resumed by calling it as it
-was called, with ``resume=True``: what was given is compared with what is kept, bit by bit.
+them, onto the disk itself, so that all frames up to a checkpoint are whole, after a loss of power
+too. A run is resumed by calling it as it was called, with ``resume=True``: what was given is
+compared with what is kept, bit by bit.
 """
 
 from __future__ import annotations
@@ -89,7 +90,7 @@ class Checkpoints:
             )  # fmt: skip
         self._compare(saved.header)
         if saved.arrays:
-            checkpoint.restore(self.sim.frames, self.sim.watchdog, saved, self.path)
+            checkpoint.restore(self.sim.frames, self.sim.watchdog, saved)
             self._captured = self.sim.frame
         return saved.header["run"]["recorded"]
 
@@ -121,11 +122,12 @@ class Checkpoints:
             return (self.sim.frame - self.first) % self.every == 0
         return not self._writing and time.perf_counter() >= self._next
 
-    def capture(self, recorded: int | None) -> Callable[[], None]:
+    def capture(self, recorded: int | None, sync: Callable[[], None]) -> Callable[[], None]:
         """Copy the present state; what is returned writes it, on any thread.
 
         Args:
             recorded: The last frame that is recorded when the state is written.
+            sync: Waits until the disk has that frame, and those before.
         """
         started = time.perf_counter()
         made = self._capture(recorded, state=True)
@@ -135,6 +137,7 @@ class Checkpoints:
 
         def write() -> None:
             started = time.perf_counter()
+            sync()
             checkpoint.write(made, self.path)
             finished = time.perf_counter()
             cost = spent + finished - started

@@ -11,8 +11,10 @@ from .. import validate
 from ..instruments.watchdog.incident import SimulationError
 from ..output import files
 from ..output.history.writer import SUFFIXES, History
+from ..output.interrupts import Deferred
+from ..output.lock import Lock, lock_path
 from ..output.progress import Meter
-from ..output.recorders import open_recorder
+from ..output.recorders import open_recorder, recorder_class
 from ..output.recorders.background import BackgroundWriter
 from ..output.recorders.base import Recorder
 from .reading import Reading
@@ -26,15 +28,25 @@ def run(
 ) -> None:  # fmt: skip
     """Advance by ``frames`` frames (see :meth:`Simulation.run`)."""
     first = sim.frame
+    # What cannot be is told before anything is made.
+    if record is not None:
+        recorder_class(record)
     if history is not None:
         files.check_new("History", history, overwrite or resume, suffixes=SUFFIXES)
     with contextlib.ExitStack() as stack:
         recording = measured = None
+        locks: dict[Path, Lock] = {}
+        for argument, path in (("record", record), ("history", history)):
+            if path is not None and lock_path(Path(path)) not in locks:
+                lock = stack.enter_context(Lock(OWNER, Path(path), argument))
+                locks[lock.path] = lock
         if record is not None:
+            interrupts = stack.enter_context(Deferred())
+            options = {"overwrite": overwrite, "resume": resume, **options}
+            lock = locks[lock_path(Path(record))]
             # First of all: a run that is resumed moves on to its checkpoint.
-            recording = stack.enter_context(
-                Recording(sim, frames, record, overwrite=overwrite, resume=resume, **options)
-            )
+            recording = stack.enter_context(Recording(sim, frames, lock, interrupts, **options))
+            interrupts.check()
         else:
             _refuse_without_record({"resume": resume, **options})
         if history is not None:
@@ -52,6 +64,8 @@ def run(
                 measured.write()
             if callable(progress):
                 progress(sim.frame - first, frames)
+            if recording is not None:
+                recording.interrupts.check()
 
 
 class Recording:
@@ -63,7 +77,8 @@ class Recording:
     Args:
         sim: The simulation, at the start of the run.
         frames: Of the whole run.
-        record: Path of the output.
+        lock: Held on the output, whose path it knows.
+        interrupts: What keeps ends that are asked for until a frame is done.
         overwrite: Replace an existing output.
         checkpoint: Frames from one checkpoint to the next, 0 for none; None: by the clock.
         resume: Go on with what is there.
@@ -71,10 +86,11 @@ class Recording:
     """
 
     def __init__(
-        self, sim: Reading, frames: int, record: Any, *, overwrite: bool = False,
-        checkpoint: int | None = None, resume: bool = False, **options: Any,
+        self, sim: Reading, frames: int, lock: Lock, interrupts: Deferred, *,
+        overwrite: bool = False, checkpoint: int | None = None, resume: bool = False,
+        **options: Any,
     ):  # fmt: skip
-        self.sim, path = sim, Path(record)
+        self.sim, self.lock, self.interrupts, path = sim, lock, interrupts, lock.output
         _check(overwrite, checkpoint, resume)
         first, end = sim.frame, sim.frame + frames
         self.checkpoints = None
@@ -89,6 +105,7 @@ class Recording:
             sim, path, frames=max(0, end - sim.frame), overwrite=overwrite,
             resume=self.recorded, **options,
         )  # fmt: skip
+        self.recorder.locked = True  # by the run
         self.background = BackgroundWriter()
         if self.checkpoints is not None and self.recorded is None and sim.frame == first:
             self.checkpoints.start(overwrite)
@@ -105,16 +122,25 @@ class Recording:
         captured = self.recorder.capture()
         if captured is not None:
             self.recorded = captured.number
-            self.background.put(lambda: self.recorder.write_frame(captured))
+            self.background.put(lambda: self._write(captured))
         if self.checkpoints is not None and self.checkpoints.due():
-            self.background.put(self.checkpoints.capture(self.recorded))
+            self.background.put(self._checkpoint())
+
+    def _write(self, captured: Any) -> None:
+        self.recorder.write_frame(captured)
+        self.lock.reserve(self.recorder.rest)
+
+    def _checkpoint(self) -> Callable[[], None]:
+        assert self.checkpoints is not None
+        return self.checkpoints.capture(self.recorded, self.recorder.sync)
 
     def close(self) -> None:
         """Write what has been captured, the end of the output, and the state to go on from."""
         self.background.close()
+        self.lock.free()
         self.recorder.close()
         if self.checkpoints is not None and not self.checkpoints.complete:
-            self.checkpoints.capture(self.recorded)()
+            self._checkpoint()()
 
     def __enter__(self) -> Self:
         return self
@@ -126,8 +152,11 @@ class Recording:
         # Finished frames are kept; the first error is the one to see.
         with contextlib.suppress(Exception):
             self.background.close()
-            if isinstance(error, SimulationError) and self.checkpoints is not None:
-                self.checkpoints.capture(self.recorded)()  # of the last good frame
+            # The state is that of the last good frame, or of the one after which an end was asked.
+            whole = isinstance(error, SimulationError) or self.interrupts.acted
+            if whole and self.checkpoints is not None and not self.checkpoints.complete:
+                self._checkpoint()()
+        self.lock.free()  # there may be no other room
         with contextlib.suppress(Exception):
             self.recorder.close()
 

@@ -212,9 +212,8 @@ class Simulation(Reading):
             ValueError: Scenes or settings of another kind, and files that are damaged, newer or
                 no checkpoint. OSError: The file is missing or cannot be read.
         """
-        source = Path(path)
-        saved = checkpoint.read(source)
-        scenes, settings = checkpoint.check(saved, source, scene, settings, worlds)
+        saved = checkpoint.read(Path(path))
+        scenes, settings = checkpoint.check(saved, scene, settings, worlds)
         sim = cls(scenes, settings, device)
-        checkpoint.restore(sim.frames, sim.watchdog, saved, source)
+        checkpoint.restore(sim.frames, sim.watchdog, saved)
         return sim

@@ -1,6 +1,8 @@
 """Runs ended at any instant: finished frames stay, and a resumed run equals a whole one."""
 
+import os
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -111,6 +113,32 @@ def test_checkpoints_by_number(tmp_path, monkeypatch):
     )
     sim().run(8, record=tmp_path / "out.npz", checkpoint=3)
     assert at == [0, 0, 3, 6, 8]  # the arguments; the first frame; every third; the end
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="says which file is open")
+def test_the_disk_has_the_frames_that_a_checkpoint_claims(suffix, tmp_path, monkeypatch):
+    path, synced, claimed, fsync = tmp_path / f"out{suffix}", [], [], os.fsync
+    write = checkpoint.write
+
+    def sync(opened):
+        fsync(opened)
+        synced.append(Path(os.readlink(f"/proc/self/fd/{opened}")))
+
+    def claim(made, target):
+        if made.arrays:
+            names = {each.name for each in synced}
+            claimed.append((made.header["frame"], set(frames_of(path)) - names))
+            assert tmp_path in synced and (path in synced or suffix == ".ply")
+            if suffix == ".gsd":
+                synced.clear()  # the one file, each time
+        write(made, target)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    monkeypatch.setattr(checkpoint, "write", claim)
+    sim().run(7, record=path, checkpoint=3)
+    assert [frame for frame, _ in claimed] == [0, 3, 6, 7]
+    if suffix != ".gsd":  # one file
+        assert not any(missing for _, missing in claimed)
 
 
 def test_checkpoints_by_the_clock_take_their_share(tmp_path, monkeypatch):

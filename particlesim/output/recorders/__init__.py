@@ -23,6 +23,24 @@ FORMATS = {
 }
 
 
+def recorder_class(path: str | os.PathLike[str]) -> type[Recorder]:
+    """What records into a file of this suffix, with all that it needs.
+
+    Raises:
+        ValueError: Another suffix. ImportError: It needs a package that is not installed.
+    """
+    suffix = Path(path).suffix
+    if suffix not in FORMATS:
+        raise validate.fail(
+            "open_recorder", "path", f"end in one of {', '.join(FORMATS)}", str(path),
+            "choose one of these",
+        )  # fmt: skip
+    module, _, name = FORMATS[suffix].rpartition(".")
+    kind: type[Recorder] = getattr(importlib.import_module(f"..{module}", __name__), name)
+    kind.library()
+    return kind
+
+
 def open_recorder(sim: Source, path: str | os.PathLike[str], **options: Any) -> Recorder:
     """The recorder for a file of this suffix.
 
@@ -42,14 +60,7 @@ def open_recorder(sim: Source, path: str | os.PathLike[str], **options: Any) -> 
         >>> with open_recorder(Simulation(scene, device="cpu"), "ball.npz") as recorder:
         ...     recorder.write()
     """
-    suffix = Path(path).suffix
-    if suffix not in FORMATS:
-        raise validate.fail(
-            "open_recorder", "path", f"end in one of {', '.join(FORMATS)}", str(path),
-            "choose one of these",
-        )  # fmt: skip
-    module, _, name = FORMATS[suffix].rpartition(".")
-    kind = getattr(importlib.import_module(f"..{module}", __name__), name)
+    kind = recorder_class(path)
     options = {name: value for name, value in options.items() if value is not None}
     if issubclass(kind, ParticleRecorder):
         known = ["frames", "fields", "every", "overwrite", "resume"]

@@ -15,6 +15,7 @@ from ... import validate
 from ...engine.loop import Source
 from .. import files
 from ..fields import ParticleFields
+from ..lock import Lock
 
 # What every frame has; a field cannot have these names.
 COLUMNS = ("position", "velocity", "radius", "id", "group", "world")
@@ -32,6 +33,8 @@ class Recorder(files.Closing):
         every: Record every k-th frame of the simulation; recorded frames count one by one.
     """
 
+    needs: tuple[str, str] | None = None  # a module, and the extra that installs it
+
     def __init__(
         self, sim: Source, path: str | os.PathLike[str], frames: int, fields: Iterable[str],
         every: int,
@@ -40,7 +43,19 @@ class Recorder(files.Closing):
         self.sim, self.path = sim, Path(path)
         self.every = validate.whole(self.owner, "every", every, minimum=1)
         self.planned_last = (sim.frame + validate.whole(self.owner, "frames", frames)) // every
-        self.fields = ParticleFields(sim, fields)
+        self.fields = ParticleFields(sim, fields, self.owner)
+        self._unsynced: dict[Path, None] = {}  # in order
+        self.locked = False  # by whoever writes through this recorder, or by itself
+        self._lock: Lock | None = None
+
+    @classmethod
+    def library(cls) -> Any:
+        """The module that the format needs, None for none.
+
+        Raises:
+            ImportError: It is not installed; the message names the extra.
+        """
+        return None if cls.needs is None else validate.installed(cls.__name__, *cls.needs)
 
     def write(self) -> None:
         """Write the simulation's present state as its present frame, if that is to be recorded."""
@@ -58,11 +73,46 @@ class Recorder(files.Closing):
         """Write what :meth:`capture` returned; touches no simulation.
 
         Raises:
-            ValueError: A frame out of order. OSError: It could not be written; those before are
-                kept.
+            ValueError: A frame out of order. OSError: It could not be written, or somebody else is
+                writing there; those before are kept.
         """
-        if frame is not None:
-            self._write(frame)
+        if frame is None:
+            return
+        if not self.locked:
+            self._lock = Lock(self.owner, self.path)
+            self.locked = True
+        self._write(frame)
+        self._unsynced.update(dict.fromkeys(self.files_of(frame.number)))
+
+    def sync(self) -> None:
+        """Return only when the disk has all frames, so that they outlive a loss of power.
+
+        Raises:
+            OSError: It cannot take them.
+        """
+        try:
+            files.sync(self._unsynced)
+        except OSError as error:
+            raise files.unwritable(self.owner, self.path, error, KEPT) from error
+        self._unsynced.clear()
+
+    @abstractmethod
+    def files_of(self, number: int) -> list[Path]:
+        """The files that hold a frame, and those that lead to it."""
+
+    @property
+    def rest(self) -> int:
+        """How much room :meth:`close` needs on the disk, as far as can be told [bytes]."""
+        return 0
+
+    def close(self) -> None:
+        """Write what has to come at the end. May be called again."""
+        try:
+            self._close()
+        finally:
+            if self._lock is not None:
+                self._lock.close()
+                self._lock, self.locked = None, False
 
     @abstractmethod
     def _capture(self) -> Any:
@@ -71,6 +121,10 @@ class Recorder(files.Closing):
     @abstractmethod
     def _write(self, frame: Any) -> None:
         """Write it."""
+
+    @abstractmethod
+    def _close(self) -> None:
+        """Write the end, once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,8 +213,7 @@ class ParticleRecorder(Recorder):
         self._put(frame)
         self.last = frame.number
 
-    def close(self) -> None:
-        """Write what has to come at the end. May be called again."""
+    def _close(self) -> None:
         if not self._closed and self.last is not None:
             self._finish()
         self._closed = True

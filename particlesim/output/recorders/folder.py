@@ -15,6 +15,7 @@ from .. import files
 from .base import KEPT, ParticleFrame, ParticleRecorder
 
 FORMAT_VERSION = 1
+INDEX = "index.json"
 
 
 class FolderRecorder(ParticleRecorder):
@@ -35,6 +36,9 @@ class FolderRecorder(ParticleRecorder):
         """The file of a frame."""
         return self.folder / f"f.{number:06d}{self.suffix}"
 
+    def files_of(self, number: int) -> list[Path]:
+        return [self.frame_path(number), self.folder / INDEX, self.path]
+
     @abstractmethod
     def _save(self, path: Path, frame: ParticleFrame) -> None:
         """Write a frame to a file."""
@@ -43,12 +47,12 @@ class FolderRecorder(ParticleRecorder):
         # What leads readers to the frames goes first: it must not show old and new ones mixed.
         self.path.unlink(missing_ok=True)
         files.make_folder(self.owner, self.folder)
-        (self.folder / "index.json").unlink(missing_ok=True)
+        (self.folder / INDEX).unlink(missing_ok=True)
         for stale in self.folder.glob("f.*"):
             stale.unlink()
         self.first = frame.number
         index = json.dumps(self._index(), indent=1)
-        with files.whole(self.owner, self.folder / "index.json", KEPT) as temporary:
+        with files.whole(self.owner, self.folder / INDEX, KEPT) as temporary:
             temporary.write_text(index + "\n", encoding="utf-8")
 
     def _put(self, frame: ParticleFrame) -> None:
@@ -65,7 +69,7 @@ class FolderRecorder(ParticleRecorder):
 
     def _go_on(self, last: int) -> None:
         try:
-            found = json.loads((self.folder / "index.json").read_text(encoding="utf-8"))
+            found = json.loads((self.folder / INDEX).read_text(encoding="utf-8"))
             self.first = int(found["first"])
         except (OSError, ValueError, TypeError, KeyError) as error:
             raise self._refuse_to_go_on(f"its index cannot be read ({error})") from error

@@ -18,7 +18,6 @@ from typing import Any, Self
 
 import numpy as np
 
-from ... import validate
 from .. import files
 from .base import KEPT, ParticleFrame, ParticleRecorder
 
@@ -46,10 +45,10 @@ class GsdRecorder(ParticleRecorder):
     Arguments are those of :class:`~particlesim.output.recorders.base.ParticleRecorder`.
     """
 
-    suffix = ".gsd"
+    suffix, needs = ".gsd", ("gsd.hoomd", "gsd")
 
     def __init__(self, *arguments: Any, **options: Any):
-        self._library = validate.installed(self.__class__.__name__, "gsd.hoomd", "gsd")
+        self._library = self.library()
         self._open: Any = None
         self._first = 0
         super().__init__(*arguments, **options)
@@ -60,6 +59,9 @@ class GsdRecorder(ParticleRecorder):
         if "image" in self.sim.state:
             frame.columns["image"] = self.sim.get("image")
         return frame
+
+    def files_of(self, number: int) -> list[Path]:
+        return [self.path]
 
     def _begin(self, frame: ParticleFrame) -> None:
         # Prepared under another name, since an empty file is not a trajectory.

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from ... import validate
 from .. import files
 from .base import KEPT, ParticleFrame
 from .folder import FolderRecorder
@@ -40,10 +39,10 @@ class VtkhdfRecorder(FolderRecorder):
     Arguments are those of :class:`~particlesim.output.recorders.base.ParticleRecorder`.
     """
 
-    suffix = ".vtkhdf"
+    suffix, needs = ".vtkhdf", ("h5py", "vtkhdf")
 
     def __init__(self, *arguments: Any, **options: Any):
-        self._library = validate.installed(self.__class__.__name__, "h5py", "vtkhdf")
+        self._library = self.library()
         self._counts: list[int] = []
         self._times: list[float] = []
         self._kinds: dict[str, tuple[np.dtype, tuple[int, ...]]] = {}  # type, and shape of a row
@@ -58,6 +57,11 @@ class VtkhdfRecorder(FolderRecorder):
         self._kinds = {name: _kind(array) for name, array in frame.columns.items()}
         if time.perf_counter() >= self._next_series:
             self._publish_series()
+
+    @property
+    def rest(self) -> int:
+        shown = self.path.stat().st_size
+        return shown * len(self._counts) // max(1, self._shown)
 
     def _finish(self) -> None:
         if self._shown != len(self._counts):

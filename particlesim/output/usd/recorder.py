@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from ...engine.loop import Source
 from ..fields import ParticleColors
 from ..recorders.base import Recorder
 from .drawing import Drawing
+from .layout import MANIFEST, clip_file
 from .writing.writer import UsdWriter
 
 
@@ -128,6 +130,13 @@ class UsdRecorder(Recorder):
             frame.number, frame.position, frame.velocity, frame.fields, **frame.changing
         )
 
-    def close(self) -> None:
-        """Give the file the end that was reached."""
+    def files_of(self, number: int) -> list[Path]:
+        clips = self.writer.clips
+        return [clip_file(clips, number), clips / MANIFEST, self.path]
+
+    @property
+    def rest(self) -> int:
+        return self.path.stat().st_size  # once more, with its true end
+
+    def _close(self) -> None:
         self.writer.close()

@@ -19,7 +19,11 @@ from .drops import unpacked
 def start(*arguments):
     """The command in a process of its own, its page's address, and where it keeps things."""
     program = [sys.executable, "-m", "particlesim.cli", "view", "--no-browser", *arguments]
-    process = subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        # What a script starts in the background has it ignored, and so would this.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
     watch = threading.Timer(120, process.kill)
     watch.start()
     line = process.stdout.readline()
