@@ -21,7 +21,6 @@ import warp as wp
 
 WRITTEN_FOR = "1.19"  # of warp-lang
 
-# Functions by name ------------------------------------------------------------------------------
 
 _FUNCTIONS: dict[tuple[Any, ...], wp.Function] = {}
 
@@ -83,13 +82,12 @@ def native_name(function: wp.Function) -> str:
 
 
 def written_in_python(value: Any) -> Callable[..., Any] | None:
-    """The Python function that a Warp function was made of; None: made of anything else.
+    """The Python function that a Warp function was made of, or None.
 
     Rests on: ``Function.func`` and ``Function.native_snippet``.
     """
-    if isinstance(value, wp.Function) and value.native_snippet is None:
-        return value.func
-    return None
+    own = isinstance(value, wp.Function) and value.native_snippet is None
+    return value.func if own else None
 
 
 def returned_types(function: wp.Function) -> list[Any] | None:
@@ -97,10 +95,7 @@ def returned_types(function: wp.Function) -> list[Any] | None:
 
     Rests on: ``type_is_generic``; ``Function.build`` without a builder, with the options of a
     module; that it sets ``adj.return_var``, whose entries have a ``type``, and builds what the
-    function calls.
-
-    Raises:
-        Exception: Of many kinds, when the code cannot be generated (see :func:`failed_line`).
+    function calls. Raises many kinds of errors where the code cannot be generated.
     """
     if any(wp._src.types.type_is_generic(kind) for kind in function.input_types.values()):
         return None
@@ -108,14 +103,12 @@ def returned_types(function: wp.Function) -> list[Any] | None:
     return [each.type for each in function.adj.return_var or ()]
 
 
-def source_lines(function: wp.Function) -> list[str]:
-    """What Warp reads of a function. Rests on: ``adj.source_lines``."""
-    return function.adj.source_lines
+def source_lines(function: wp.Function) -> tuple[list[str], int]:
+    """What Warp reads of a function, and which line, from 1, no code could be generated of.
 
-
-def failed_line(function: wp.Function) -> int:
-    """Which of them, from 1, no code could be generated of. Rests on: ``adj.lineno``."""
-    return (function.adj.lineno or 0) + 1
+    Rests on: ``adj.source_lines`` and ``adj.lineno``.
+    """
+    return function.adj.source_lines, (function.adj.lineno or 0) + 1
 
 
 def argument_names(function: wp.Function) -> tuple[str, ...]:
@@ -124,10 +117,7 @@ def argument_names(function: wp.Function) -> tuple[str, ...]:
 
 
 def compiled(source: str, name: str, scope: dict[str, Any]) -> Callable[..., Any]:
-    """The function ``name`` of generated source, which Warp can read again.
-
-    Rests on: Warp reads sources by ``inspect``, which asks ``linecache``.
-    """
+    """The function ``name`` of generated source. Rests on: Warp asks ``inspect`` for sources."""
     filename = f"<particlesim {name} {digest(source)}>"
     scope = dict(scope)
     exec(compile(source, filename, "exec"), scope)
@@ -157,8 +147,6 @@ def digest(*parts: Any) -> str:
     return hashlib.sha256("|".join(map(text, parts)).encode()).hexdigest()[:12]
 
 
-# Packed launches --------------------------------------------------------------------------------
-
 # C++: run the launch whose three addresses ``packed`` points to.
 RUN_PACKED = "((void (*)(void*, void*))packed[0])((void*)packed[1], (void*)packed[2])"
 
@@ -168,10 +156,8 @@ class Packed:
 
     Rests on: ``Launch.hooks.forward``, a ctypes function of two pointers that returns nothing;
     ``Launch.params``, the bounds and then the arguments as ctypes; that the second pointer is to a
-    struct of those arguments in the order of ``kernel.adj.args``.
-
-    Args:
-        command: Of ``wp.launch(..., device="cpu", record_cmd=True)``.
+    struct of those arguments in the order of ``kernel.adj.args``. ``command`` is that of
+    ``wp.launch(..., device="cpu", record_cmd=True)``.
 
     Raises:
         RuntimeError: The kernel is not loaded: it has no entry point.
@@ -202,14 +188,12 @@ class Packed:
         return run
 
 
-# Watching ---------------------------------------------------------------------------------------
-
 # How native functions that do device work begin; others allocate and ask.
-WORK = tuple(f"wp_{each}" for each in (
-    "memcpy", "memset", "memtile", "array_", "cuda_launch_kernel", "cpu_launch_kernel",
-    "hash_grid_up", "bvh_re", "mesh_re", "mesh_set", "radix_sort", "segmented_sort", "runlength",
-    "bsr_",
-))  # fmt: skip
+WORK = tuple(
+    f"wp_{each}"
+    for each in "memcpy memset memtile array_ cuda_launch_kernel cpu_launch_kernel hash_grid_up "
+    "bvh_re mesh_re mesh_set radix_sort segmented_sort runlength bsr_".split()
+)
 
 
 def doors() -> list[tuple[Any, str, str]]:
@@ -225,19 +209,16 @@ def doors() -> list[tuple[Any, str, str]]:
     context = wp._src.context
     kinds = dict.fromkeys([*wp.array.__mro__, *wp.indexedarray.__mro__])
     reads = ("numpy", "list", "__dlpack__", "__array_interface__", "__cuda_array_interface__")
-    cpu = ("invoke", "invoke_cpu_blocks")
     return [
         *[(owner, "launch", "launch") for owner in (wp, context)],
         *[(owner, "copy", "write") for owner in (wp, context)],
-        *[
-            (kind, name, "write")
-            for kind in kinds
-            for name in ("zero_", "fill_")
-            if name in vars(kind)
-        ],
+        *[(k, n, "write") for k in kinds for n in ("zero_", "fill_") if n in vars(k)],
         *[(k, n, f"array.{n}") for k in kinds for n in reads if n in vars(k)],
         (wp.array, "_init_from_data", "an array made of data"),
-        *[(context, name, "a launch that cannot be recorded") for name in cpu],
+        *[
+            (context, name, "a launch that cannot be recorded")
+            for name in ("invoke", "invoke_cpu_blocks")
+        ],
         (context.runtime, "core", "native"),
     ]
 
@@ -266,14 +247,8 @@ def part_captures() -> None:
         setattr(type(wp._src.context.runtime), name, _OfThread())
 
 
-# Native code ------------------------------------------------------------------------------------
-
-
 def elements(array: str, c: str) -> str:
-    """C++: pointer to the numbers of an array without gaps, of type ``c``.
-
-    Rests on: ``array_t::data``; that vectors are their components and nothing else.
-    """
+    """C++: pointer to an array's numbers, without gaps. Rests on: ``array_t::data``; vectors."""
     return f"(({c}*){array}.data)"
 
 

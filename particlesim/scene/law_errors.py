@@ -9,7 +9,7 @@ import warp as wp
 
 from .. import validate
 from ..kernels.precision import Precision, annotation, definition
-from ..kernels.warp_internals import digest, failed_line, returned_types, source_lines
+from ..kernels.warp_internals import digest, returned_types, source_lines
 
 LONGEST = 160  # of what is passed on of Warp's words
 # What to do about what Warp says.
@@ -71,11 +71,11 @@ def _line(source: str, node: ast.AST) -> str:
 
 def _failing(source: str, function: wp.Function) -> str:
     """The line of the source that stands where Warp failed in what it was translated to."""
+    lines, at = source_lines(function)
     written, read = (
         [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.stmt)]
-        for text in (source, "\n".join(source_lines(function)))
+        for text in (source, "\n".join(lines))
     )
-    at = failed_line(function)
     for ours, theirs in zip(written, read, strict=True):
         if theirs.lineno <= at <= (theirs.end_lineno or at) and not hasattr(theirs, "body"):
             return _line(source, ours)

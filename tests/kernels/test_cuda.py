@@ -66,7 +66,7 @@ def forces():
     scene.add_interaction(ps.PairForce(repel, cutoff=1.0))
     scene.add_interaction(ps.PairPotential(screened, cutoff=None, screening=1.0, power=-1))
     scene.add_interaction(ps.Gravity(some))
-    scene.add_interaction(ps.Springs([(0, 1)], 1.0))
+    scene.add_interaction(ps.Springs([(0, 1)], 1.0, 1.0))
     scene.add_interaction(ps.UniformGravity())
     scene.add_interaction(ps.Drag(1.0))
     scene.add_interaction(ps.ConstantForce((0, 1, 0)))
@@ -77,7 +77,7 @@ def forces():
 def few_forces(periodic, count):
     scene = particles(count, periodic)
     scene.add_interaction(ps.PairPotential(screened, cutoff=2.4, screening=1.0, power=2))
-    scene.add_interaction(ps.Springs([(0, 1)], 1.0))
+    scene.add_interaction(ps.Springs([(0, 1)], 1.0, 1.0))
     return scene
 
 
@@ -94,7 +94,7 @@ def constrained(periodic, *, breaks, bounces):
     scene = particles(periodic=periodic)
     limit = {"break_force": 1.0} if breaks else {}
     triangle = ps.Constraint(flat, [(3, 4, 5)], area=1.0, inequality=True, **limit)
-    scene.add_constraint(ps.Distance([(0, 1), (1, 2)], compliance=1e-6, damping=0.1, **limit))
+    scene.add_constraint(ps.Distance([(0, 1), (1, 2)], 1.0, compliance=1e-6, damping=0.1, **limit))
     scene.add_constraint(triangle)
     if not breaks:
         scene.add_interaction(ps.Constraint(flat, [(6, 7, 8)], area=1.0, compliance=1e-3)

@@ -192,5 +192,6 @@ def test_code_is_generated_to_find_what_is_returned_and_what_is_wrong():
     made = translate(fails, FLOAT32)
     with pytest.raises(AttributeError, match="no_such_function"):
         internals.returned_types(made)
-    line = internals.source_lines(made)[internals.failed_line(made) - 1]
+    lines, at = internals.source_lines(made)
+    line = lines[at - 1]
     assert line.strip() == "return wp.no_such_function(y)"

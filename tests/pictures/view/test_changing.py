@@ -58,6 +58,7 @@ def test_a_recording_that_grows_and_is_replaced(tmp_path):
                 assert status == {"take": 0, "frames": [frame], "live": None}
                 _, arrays = packet(server, f"/frame/{frame}")
                 assert np.array_equal(arrays["thing.ball"][:, :3], sim.position)
+            recorder.close()  # of two writers of one file the second would be refused
             other = simulation(2)
             with UsdRecorder(other, path, frames=1, overwrite=True) as again:
                 again.write()
