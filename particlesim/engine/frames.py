@@ -55,6 +55,7 @@ class Frames:
     def run(self, substeps: int) -> None:
         """One frame. Nothing is ever left out of a full row: back to its start, and again."""
         self.executor(substeps).run()
+        self.loop.fresh = False
         while self.loop.neighbors.overflowing:
             self._restart()
             self.executor(substeps).run()
@@ -98,7 +99,7 @@ class Frames:
     def _record(self, substeps: int, peak: wp.array | None) -> Frame:
         """A frame of so many substeps; ``peak``: where to note the largest speeds."""
         loop, frame = self.loop, Frame(repeat=substeps)
-        model, state = loop.model, loop.state
+        model, state, fresh = loop.model, loop.state, loop.fresh
 
         def substep() -> None:
             loop.substep(loop.settings.dt / substeps)
@@ -112,6 +113,7 @@ class Frames:
         self._refuse_idle(frame.substep)
         with record(frame.after):
             self.guard.look(state)
+        loop.fresh = fresh  # what is recorded has not been done
         return frame
 
     def _refuse_idle(self, substep: Program) -> None:

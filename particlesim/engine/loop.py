@@ -22,6 +22,8 @@ from .neighbors.lists import Neighbors
 from .observers import FINISH, FORCE, PROJECT, Observers
 from .state import State
 
+LEFT_BY_FORCES = ("force", "density", "pressure")
+
 Fuse = Callable[[Sequence[Interaction]], list[Interaction]]
 
 
@@ -43,6 +45,7 @@ class Loop:
         self.laws = laws_of(scenes[0])  # as they are read now
         self.model = model = Model(scenes, settings, device)
         self.frame = 0
+        self.fresh = True  # no forces have been evaluated since the start
         self._distinct = list({id(scene): scene for scene in scenes}.values())
         self._changes = self._counted()
         # What is prepared allocates only what it requires.
@@ -85,6 +88,7 @@ class Loop:
 
     def forces(self, dt: float) -> None:
         """Interactions add forces at the present positions."""
+        self.fresh = False
         self.neighbors.update(self.state)
         self.state.clear_forces()
         now = self.state, self.neighbors, dt
@@ -174,7 +178,20 @@ class Loop:
 
     def get(self, name: str) -> np.ndarray:
         """A per-particle array, copied to the host."""
+        self.ready(name)
         return self.state.held(name).numpy().copy()
+
+    def ready(self, name: str) -> None:
+        """Before the first step: make what forces leave behind, if that is what is to be read."""
+        if not self.fresh or name not in LEFT_BY_FORCES or name not in self.state:
+            return
+        if self.integrator.carries_forces:
+            self.know_forces()
+        else:
+            self.forces(self.settings.substep)
+            if self.neighbors.grow():
+                self.forces(self.settings.substep)
+        self.fresh = True
 
 
 def _bound(parts: Sequence[Sequence[Any]]) -> list[Any]:
