@@ -6,6 +6,7 @@ import warp as wp
 from pxr import Usd, UsdGeom
 
 import particlesim as ps
+from cases.worlds import equal_alone, goes_on_after_reset_and_save
 from particlesim.instruments.residuals import residuals
 
 G = 9.81
@@ -74,30 +75,13 @@ def stirred(k, scene_of):
 def test_a_world_in_a_batch_equals_it_alone(precision, device, simulate, scene_of):
     """Bit for bit, with parameters of its own."""
     knobs = {"dt": 1 / 60, "substeps": 4, "precision": precision}
-    together = simulate([stirred(k, scene_of) for k in range(3)], device, **knobs)
-    together.run(40)
-    for k in range(3):
-        alone = simulate(stirred(k, scene_of), device, **knobs)
-        alone.run(40)
-        assert np.array_equal(together.world(k).position, alone.position)
-        assert np.array_equal(together.world(k).velocity, alone.velocity)
+    equal_alone(simulate, [stirred(k, scene_of) for k in range(3)], device, 40, **knobs)
 
 
 def test_reset_and_checkpoint(tmp_path, device, simulate, scene_of):
     """A world that is reset goes as at first; a run that was saved goes on, bit for bit."""
     scenes = [stirred(k, scene_of) for k in range(1, 3)]
-    straight = simulate(scenes, device)
-    straight.run(20)
-    first = straight.world(0).position
-    sim = simulate(scenes, device)
-    sim.run(7)
-    sim.reset([0])
-    sim.save(tmp_path / "half.npz")
-    sim.run(20)
-    assert np.array_equal(sim.world(0).position, first)
-    loaded = ps.Simulation.load(tmp_path / "half.npz", scenes, device=device)
-    loaded.run(20)
-    assert np.array_equal(loaded.position, sim.position)
+    goes_on_after_reset_and_save(simulate, scenes, device, tmp_path / "half.npz")
 
 
 def test_a_checkpoint_of_another_law_is_refused(tmp_path, device, simulate, scene_of, refused):

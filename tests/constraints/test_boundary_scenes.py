@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
+from cases.worlds import equal_alone
 
 INF = np.inf
 
@@ -30,13 +31,7 @@ def hail(scene_of):
 def test_a_world_in_a_batch_equals_it_alone(precision, device, simulate, hail):
     """Bit for bit, with parameters of its own."""
     knobs = {"dt": 1 / 60, "substeps": 5, "precision": precision}
-    together = simulate([hail(k) for k in range(3)], device, **knobs)
-    together.run(60)
-    for k in range(3):
-        alone = simulate(hail(k), device, **knobs)
-        alone.run(60)
-        assert np.array_equal(together.world(k).position, alone.position)
-        assert np.array_equal(together.world(k).velocity, alone.velocity)
+    equal_alone(simulate, [hail(k) for k in range(3)], device, 60, **knobs)
 
 
 def test_graph_equals_threads(simulate, scene_of):
