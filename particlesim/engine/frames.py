@@ -55,10 +55,10 @@ class Frames:
     def run(self, substeps: int) -> None:
         """One frame. Nothing is ever left out of a full row: back to its start, and again."""
         self.executor(substeps).run()
-        self.loop.fresh = False
         while self.loop.neighbors.overflowing:
             self._restart()
             self.executor(substeps).run()
+        self.loop.unknown_forces.clear()
 
     def place_on_constraints(self, iterations: int) -> None:
         """See :meth:`Loop.place_on_constraints`; again where a row of neighbours was full."""
@@ -99,7 +99,7 @@ class Frames:
     def _record(self, substeps: int, peak: wp.array | None) -> Frame:
         """A frame of so many substeps; ``peak``: where to note the largest speeds."""
         loop, frame = self.loop, Frame(repeat=substeps)
-        model, state, fresh = loop.model, loop.state, loop.fresh
+        model, state = loop.model, loop.state
 
         def substep() -> None:
             loop.substep(loop.settings.dt / substeps)
@@ -113,7 +113,6 @@ class Frames:
         self._refuse_idle(frame.substep)
         with record(frame.after):
             self.guard.look(state)
-        loop.fresh = fresh  # what is recorded has not been done
         return frame
 
     def _refuse_idle(self, substep: Program) -> None:

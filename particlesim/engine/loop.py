@@ -45,7 +45,6 @@ class Loop:
         self.laws = laws_of(scenes[0])  # as they are read now
         self.model = model = Model(scenes, settings, device)
         self.frame = 0
-        self.fresh = True  # no forces have been evaluated since the start
         self._distinct = list({id(scene): scene for scene in scenes}.values())
         self._changes = self._counted()
         # What is prepared allocates only what it requires.
@@ -71,7 +70,9 @@ class Loop:
             part.attach(model, self.state)
         self.passes: Sequence[Interaction] = fuse(self.interactions)
         self.observers = Observers()
-        self.unknown_forces = set(range(model.world_count))  # worlds, for a first kick
+        # Worlds that are not as the last evaluation of the forces, or the substep after it, left
+        # them.
+        self.unknown_forces = set(range(model.world_count))
 
     def substep(self, dt: float) -> None:
         """Advance by ``dt``: interactions, integration, constraints, velocities."""
@@ -88,7 +89,6 @@ class Loop:
 
     def forces(self, dt: float) -> None:
         """Interactions add forces at the present positions."""
-        self.fresh = False
         self.neighbors.update(self.state)
         self.state.clear_forces()
         now = self.state, self.neighbors, dt
@@ -111,19 +111,20 @@ class Loop:
     # Outside a substep ------------------------------------------------------------------------
 
     def know_forces(self) -> None:
-        """Evaluate the forces that a first kick starts from, in worlds where they are not known."""
-        if not self.integrator.carries_forces or not self.unknown_forces:
+        """Evaluate the forces, and what is found with them, in worlds where they are not known."""
+        if not self.unknown_forces:
             return
         known = set(range(self.model.world_count)) - self.unknown_forces
-        carried = []
-        if known and "force" in self.state:
-            carried = [self.state.force, *self.observers.carried()]
-        before = [each.numpy().copy() for each in carried]
+        left = []
+        if known:
+            found = [self.state.held(name) for name in LEFT_BY_FORCES if name in self.state]
+            left = [*found, *self.observers.carried()]
+        before = [each.numpy().copy() for each in left]
         self.forces(self.settings.substep)
         if self.neighbors.grow():
             self.forces(self.settings.substep)
         keep = np.isin(self.model.world_of, list(known))
-        for each, old in zip(carried, before, strict=True):
+        for each, old in zip(left, before, strict=True):
             # Forces that depend on velocity would not come out as they were within the step.
             force = each.numpy().copy()
             force[keep] = old[keep]
@@ -178,20 +179,13 @@ class Loop:
 
     def get(self, name: str) -> np.ndarray:
         """A per-particle array, copied to the host."""
-        self.ready(name)
-        return self.state.held(name).numpy().copy()
+        return self.held(name).numpy().copy()
 
-    def ready(self, name: str) -> None:
-        """Before the first step: make what forces leave behind, if that is what is to be read."""
-        if not self.fresh or name not in LEFT_BY_FORCES or name not in self.state:
-            return
-        if self.integrator.carries_forces:
+    def held(self, name: str) -> wp.array:
+        """A per-particle array, where it is; what forces leave behind is evaluated if need be."""
+        if name in LEFT_BY_FORCES and name in self.state:
             self.know_forces()
-        else:
-            self.forces(self.settings.substep)
-            if self.neighbors.grow():
-                self.forces(self.settings.substep)
-        self.fresh = True
+        return self.state.held(name)
 
 
 def _bound(parts: Sequence[Sequence[Any]]) -> list[Any]:

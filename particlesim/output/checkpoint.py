@@ -100,7 +100,7 @@ def restore(frames: Frames, watchdog: Watchdog, saved: Saved) -> None:
     """
     loop = frames.loop
     _fill(frames, saved)
-    loop.frame, loop.fresh = saved.header["frame"], False
+    loop.frame = saved.header["frame"]
     loop.unknown_forces = set(saved.header["unknown_forces"])
     watchdog.incidents = [Incident.of_saved(each) for each in saved.header.get("incidents", ())]
     watchdog.resume(frames, saved.header.get("frozen", ()))

@@ -80,7 +80,7 @@ class Writer:
                 "name worlds of this simulation",
             )  # fmt: skip
         if len(chosen) == count:
-            loop.frame, loop.fresh = 0, True
+            loop.frame = 0
         loop.state.reset(chosen)
         loop.neighbors.renew(loop.state, chosen)
         for part in loop.parts:
@@ -175,8 +175,7 @@ class World(Access):
 
     def get(self, name: str) -> np.ndarray:
         """A per-particle array of this world, copied to the host."""
-        self._loop.ready(name)
-        array = self._loop.state.held(name)
+        array = self._loop.held(name)
         if self.rows.start == self.rows.stop:  # Warp has no empty slice at an array's end
             return array.numpy()[self.rows].copy()
         return array[self.rows].numpy().copy()

@@ -96,7 +96,8 @@ class Simulation(Reading):
                 stacklevel=2,
             )
         if self.particle_count and self.settings.dt > 0:
-            self.loop.know_forces()
+            if self.loop.integrator.carries_forces:
+                self.loop.know_forces()
             self.frames.run(self.settings.substeps)
             if self.watchdog.alarmed:
                 self.watchdog.attend(self.frames)

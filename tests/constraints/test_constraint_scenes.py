@@ -7,6 +7,7 @@ import pytest
 import warp as wp
 
 import particlesim as ps
+from cases.worlds import equal_alone
 
 
 @pytest.fixture
@@ -39,13 +40,8 @@ def test_a_world_in_a_batch_equals_it_alone(precision, device, simulate, hung_cl
     """Bit for bit, with a compliance of its own in each world."""
     compliances = [0.0, 1e-6, 1e-4]
     knobs = {"dt": 1 / 60, "substeps": 8, "iterations": 2, "precision": precision}
-    together = simulate([hung_cloth(c, seed=k) for k, c in enumerate(compliances)], device, **knobs)
-    together.run(10)
-    for k, c in enumerate(compliances):
-        alone = simulate(hung_cloth(c, seed=k), device, **knobs)
-        alone.run(10)
-        assert np.array_equal(together.world(k).position, alone.position)
-        assert np.array_equal(together.world(k).velocity, alone.velocity)
+    scenes = [hung_cloth(c, seed=k) for k, c in enumerate(compliances)]
+    equal_alone(simulate, scenes, device, 10, **knobs)
 
 
 def test_reset_of_one_world_leaves_the_others(device, simulate, hung_cloth):

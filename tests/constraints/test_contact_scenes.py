@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
+from cases.worlds import equal_alone
 
 
 @pytest.fixture
@@ -26,13 +27,7 @@ def test_a_world_in_a_batch_equals_it_alone(precision, device, simulate, heap):
     """Bit for bit, with and without friction, restitution and compliance; all overlap in space."""
     knobs = {"dt": 1 / 60, "substeps": 5, "iterations": 2, "precision": precision}
     scenes = [heap(k) for k in range(4)]
-    together = simulate(scenes, device, **knobs)
-    together.run(40)
-    for k, scene in enumerate(scenes):
-        alone = simulate(scene, device, **knobs)
-        alone.run(40)
-        assert np.array_equal(together.world(k).position, alone.position)
-        assert np.array_equal(together.world(k).velocity, alone.velocity)
+    equal_alone(simulate, scenes, device, 40, **knobs)
 
 
 def test_reset_and_placement_leave_other_worlds(device, simulate, heap):

@@ -1,10 +1,13 @@
 """Lists in a batch: each world has the rows, the passes and the sums that it has alone."""
 
+import functools
+
 import numpy as np
 import pytest
 import warp as wp
 
 import particlesim as ps
+from cases.worlds import equal_alone
 
 
 @ps.law
@@ -106,13 +109,8 @@ def test_a_world_goes_as_it_goes_alone(case, backwards, precision, device):
     build, worlds = CASES[case]
     worlds = worlds[::-1] if backwards else worlds
     settings = ps.Settings(**SETTINGS, precision=precision)
-    batch = ps.Simulation([build(*each) for each in worlds], settings, device=device)
-    batch.run(15)
-    for w, each in enumerate(worlds):
-        alone = ps.Simulation(build(*each), settings, device=device)
-        alone.run(15)
-        np.testing.assert_array_equal(batch.world(w).position, alone.position)
-        np.testing.assert_array_equal(batch.world(w).velocity, alone.velocity)
+    simulate = functools.partial(ps.Simulation, settings=settings)
+    equal_alone(simulate, [build(*each) for each in worlds], device, 15)
 
 
 def test_worlds_that_agree_have_no_more_than_one_world(device):

@@ -193,3 +193,22 @@ def test_what_forces_leave_behind_is_there_before_the_first_step(integrator, dev
         each.run(3)
     np.testing.assert_array_equal(sim.position, plain.position)
     np.testing.assert_array_equal(sim.get("density"), plain.get("density"))
+
+
+@pytest.mark.parametrize("integrator", ["symplectic_euler", "velocity_verlet"])
+def test_a_world_that_is_placed_has_the_forces_of_where_it_is(integrator, device):
+    """Those of its start after a reset of its own; the other world keeps what its step has left."""
+    scene = ps.Scene()
+    scene.add_particles([(0, 0, 0), (1.5, 0, 0)])
+    scene.add_interaction(ps.Springs([(0, 1)], stiffness=4.0, rest_length=1.0))
+    settings = ps.Settings(dt=0.1, substeps=1, integrator=integrator)
+    sim = ps.Simulation(scene, settings, device=device, worlds=2)
+    start = sim.get("force")
+    sim.run(2)
+    left = sim.get("force")
+    assert not np.array_equal(left, start)
+    sim.reset([1])
+    np.testing.assert_array_equal(sim.world(1).get("force"), start[2:])
+    np.testing.assert_array_equal(sim.world(0).get("force"), left[:2])
+    sim.world(0).position = [(0, 0, 0), (2, 0, 0)]
+    np.testing.assert_array_equal(sim.get("force")[0], (4, 0, 0))  # k (2 - 1)

@@ -1,9 +1,12 @@
 """SPH: conservation, coincident particles, worlds, and what it refuses."""
 
+import functools
+
 import numpy as np
 import pytest
 
 import particlesim as ps
+from cases.worlds import equal_alone
 from particlesim.interactions.fluid.smoothing import SMOOTHING
 
 EPSILON = {"float32": 2.0**-24, "float64": 2.0**-53}
@@ -106,13 +109,8 @@ def test_worlds_have_their_own_parameters_and_equal_each_alone(cloud, fluid):
         )  # fmt: skip
 
     settings = ps.Settings(dt=0.01, substeps=5)
-    batch = ps.Simulation([build(k) for k in range(3)], settings, device="cpu")
-    batch.run(2)
-    for k in range(3):
-        alone = ps.Simulation(build(k), settings, device="cpu")
-        alone.run(2)
-        assert np.all(batch.world(k).position == alone.position)
-        assert np.all(batch.world(k).velocity == alone.velocity)
+    simulate = functools.partial(ps.Simulation, settings=settings)
+    batch = equal_alone(simulate, [build(k) for k in range(3)], "cpu", 2)
     assert np.ptp(batch.diagnostics().potential) > 0
 
 
