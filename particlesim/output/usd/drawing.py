@@ -16,6 +16,7 @@ from ...scene.scene import Scene
 from ..surface import Mesh, Surface
 from .description import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
 from .placement import closed, offsets, periodic_box
+from .shapes import SHAPES
 
 OWNER = "UsdRecorder"
 PLAYBACK_FPS = 24.0  # where a frame is not a sensible part of a second
@@ -210,8 +211,9 @@ class Drawing:
             for w in self.worlds:
                 for each in part.peers[w].shapes():
                     described = closed(each, self.sim.scenes[w].position)
-                    make = getattr(Shape, described.pop("kind"))
-                    shape = make(world=w, name=part.name, **described)
+                    names = SHAPES[described["kind"]]
+                    parameters = tuple(described.pop(name) for name in names)
+                    shape = Shape(parameters=parameters, world=w, name=part.name, **described)
                     if shape.moving:
                         self.moving.append((shape, part.peers[w]))
                     yield shape

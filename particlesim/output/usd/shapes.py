@@ -21,16 +21,17 @@ Color = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A boundary. Made by :meth:`plane`, :meth:`box`, :meth:`sphere` and :meth:`mesh`.
+    """A boundary.
 
     Args:
-        world: Number of the world, from 0.
-        name: Name of the boundary; made a valid and unique prim name.
         kind: ``"plane"``, ``"box"``, ``"sphere"`` or ``"mesh"``.
-        parameters: (point, normal), (lower, upper), (center, radius) or (points (p, 3), triangles
-            (t, 3) int), [length]; of a moving shape, where it is before its pose moves it.
-        container: Particles live inside it, so it is drawn clear; otherwise solid. A plane is
-            drawn clear where the camera is behind it.
+        parameters: (point, normal), to where particles are; (lower, upper); (center, radius); or
+            (points (p, 3), triangles (t, 3) int, counterclockwise from outside); [length]. Of a
+            moving shape, where it is before its pose moves it.
+        world: Number of the world, from 0.
+        name: Name of the boundary, by default its kind; made a valid and unique prim name.
+        container: Particles live inside it, so it is drawn clear; otherwise solid. By default true
+            of boxes and spheres. A plane is drawn clear where the camera is behind it.
         color: (r, g, b) in 0..1, linear.
         moving: Its pose comes with every frame: ``(translation, rotation)``, (3,) [length] and a
             (3, 3) matrix R, which take a point x of the shape to R x + translation.
@@ -39,53 +40,28 @@ class Shape:
         ValueError: A kind that is not known, parameters that make no such shape.
 
     Example:
-        >>> Shape.sphere((0, 1, 0), 0.5).parameters[1]
+        >>> Shape("sphere", ((0, 1, 0), 0.5)).parameters[1]
         0.5
     """
 
-    world: int
-    name: str
     kind: str
     parameters: tuple[Any, Any]
-    container: bool = True
+    world: int = 0
+    name: str = ""
+    container: bool | None = None
     color: Color = (0.5, 0.5, 0.5)
     moving: bool = False
 
     def __post_init__(self) -> None:
-        named("Shape", self)
         validate.choice("Shape", "kind", self.kind, SHAPES)
+        replace(self, "name", self.name or self.kind)
+        named("Shape", self)
         replace(self, "parameters", _checked(self.kind, *self.parameters))
 
-    @classmethod
-    def plane(
-        cls, point: Any, normal: Any, world: int = 0, name: str = "plane", moving: bool = False
-    ) -> Shape:
-        """The plane through ``point`` [length]; particles are on the side of ``normal``."""
-        return cls(world, name, "plane", (point, normal), container=False, moving=moving)
-
-    @classmethod
-    def box(
-        cls, lower: Any, upper: Any, world: int = 0, name: str = "box", container: bool = True,
-        moving: bool = False,
-    ) -> Shape:  # fmt: skip
-        """The box between two corners [length]."""
-        return cls(world, name, "box", (lower, upper), container, moving=moving)
-
-    @classmethod
-    def sphere(
-        cls, center: Any, radius: float, world: int = 0, name: str = "sphere",
-        container: bool = True, moving: bool = False,
-    ) -> Shape:  # fmt: skip
-        """The sphere around ``center`` [length]."""
-        return cls(world, name, "sphere", (center, radius), container, moving=moving)
-
-    @classmethod
-    def mesh(
-        cls, points: Any, triangles: Any, world: int = 0, name: str = "mesh",
-        container: bool = False, moving: bool = False,
-    ) -> Shape:  # fmt: skip
-        """Triangles (t, 3) int between points (p, 3) [length], counterclockwise from outside."""
-        return cls(world, name, "mesh", (points, triangles), container, moving=moving)
+    @property
+    def clear(self) -> bool:
+        """Whether it is drawn clear."""
+        return self.kind in ("box", "sphere") if self.container is None else self.container
 
 
 def _checked(kind: str, first: Any, second: Any) -> tuple[Any, Any]:

@@ -157,11 +157,11 @@ def test_moving_shapes_have_their_transforms_in_the_clips(tmp_path):
     assert Shape is SameShape
     points, triangles = tetrahedron()
     shapes = [
-        Shape.plane((0, -1, 0), (0, 1, 0), moving=True),
-        Shape.box((-1, -1, -1), (1, 1, 1), moving=True),
-        Shape.sphere((3, 0, 0), 0.5, moving=True),
-        Shape.mesh(points, triangles, moving=True),
-        Shape.box((-2, -2, -2), (2, 2, 2), name="still"),
+        Shape("plane", ((0, -1, 0), (0, 1, 0)), moving=True),
+        Shape("box", ((-1, -1, -1), (1, 1, 1)), moving=True),
+        Shape("sphere", ((3, 0, 0), 0.5), moving=True),
+        Shape("mesh", (points, triangles), moving=True),
+        Shape("box", ((-2, -2, -2), (2, 2, 2)), name="still"),
     ]
     turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     position, velocity = motion(3)
@@ -194,7 +194,7 @@ def test_moving_shapes_have_their_transforms_in_the_clips(tmp_path):
     ],
 )
 def test_poses_that_are_none_are_refused(tmp_path, refused, pose, match):
-    box = Shape.box((0, 0, 0), (1, 1, 1), moving=True)
+    box = Shape("box", ((0, 0, 0), (1, 1, 1)), moving=True)
     out = UsdWriter(tmp_path / "out.usda", StageInfo(points=[group()], shapes=[box]))
     with refused(match):
         out.write(0, *motion(1)[:, 0], poses={box: pose})

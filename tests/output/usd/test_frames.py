@@ -202,9 +202,9 @@ def test_links_take_the_short_way_in_a_periodic_box(tmp_path):
 def test_shapes_are_where_they_should_be(tmp_path):
     path = tmp_path / "out.usda"
     shapes = [
-        Shape.plane((0, -1, 0), (1, 2, 0)),
-        Shape.box((-1, -2, -3), (3, 2, 1)),
-        Shape.sphere((1, 2, 3), 0.5, container=False),
+        Shape("plane", ((0, -1, 0), (1, 2, 0))),
+        Shape("box", ((-1, -2, -3), (3, 2, 1))),
+        Shape("sphere", ((1, 2, 3), 0.5), container=False),
     ]
     record(path, StageInfo(points=[group()], shapes=shapes, frames=3))
     stage = opened(path)
@@ -231,7 +231,7 @@ def test_shapes_are_where_they_should_be(tmp_path):
 @pytest.mark.parametrize("name", ["box/faces", "sphere"])
 def test_surfaces_face_outwards(tmp_path, name):
     path = tmp_path / "out.usda"
-    shapes = [Shape.box((1, 1, 1), (2, 3, 4)), Shape.sphere((1, 2, 3), 0.5)]
+    shapes = [Shape("box", ((1, 1, 1), (2, 3, 4))), Shape("sphere", ((1, 2, 3), 0.5))]
     record(path, StageInfo(points=[group()], shapes=shapes, frames=3))
     stage = opened(path)
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath(f"/World/env_0000/boundaries/{name}"))
@@ -245,9 +245,9 @@ def test_surfaces_face_outwards(tmp_path, name):
 @pytest.mark.parametrize("up_axis", ["y", "z"])
 def test_camera_sees_everything_from_above(tmp_path, up_axis):
     path, up = tmp_path / "out.usda", "xyz".index(up_axis)
-    floor = Shape.plane((0, 0, 0), np.eye(3)[up])
+    floor = Shape("plane", ((0, 0, 0), np.eye(3)[up]))
     info = StageInfo(
-        points=[group()], shapes=[floor, Shape.box((2, 2, 2), (9, 3, 4))], up_axis=up_axis
+        points=[group()], shapes=[floor, Shape("box", ((2, 2, 2), (9, 3, 4)))], up_axis=up_axis
     )
     position, _ = record(path, info, frames=1)
     stage = opened(path)

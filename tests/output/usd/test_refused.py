@@ -103,10 +103,10 @@ def test_frames_come_one_by_one(tmp_path):
             lambda: LinksPrim(0, "rope", np.eye(2, dtype=int), 0, RED),
             "LinksPrim: width must be above",
         ),
-        (lambda: Shape.plane((0, 0, 0), (0, 0, 0)), "Shape: normal must have a length"),
-        (lambda: Shape.box((0, 0, 0), (1, 0, 1)), "Shape: upper must be above lower"),
-        (lambda: Shape.sphere((0, 0, 0), 0), "Shape: radius must be above 0"),
-        (lambda: Shape(0, "x", "torus", (0, 0)), "Shape: kind must be one of plane, box, sphere"),
+        (lambda: Shape("plane", ((0, 0, 0), (0, 0, 0))), "Shape: normal must have a length"),
+        (lambda: Shape("box", ((0, 0, 0), (1, 0, 1))), "Shape: upper must be above lower"),
+        (lambda: Shape("sphere", ((0, 0, 0), 0)), "Shape: radius must be above 0"),
+        (lambda: Shape("torus", (0, 0)), "Shape: kind must be one of plane, box, sphere"),
         (lambda: StageInfo(points=[]), "StageInfo: points must hold a group"),
         (lambda: StageInfo(points=[group()], up_axis="x"), "StageInfo: up_axis must be 'y' or 'z'"),
         (lambda: StageInfo(points=[group()], fps=0), "StageInfo: fps must be above 0"),
@@ -138,7 +138,7 @@ def everything():
     return {
         "rows": group(indices=None, ids=None), "pairs": LinksPrim(0, "rope", None, 0.1, RED),
         "meshes": MeshPrim(0, "skin", BLUE),
-        "poses": Shape.box((0, 0, 0), (1, 1, 1), moving=True),
+        "poses": Shape("box", ((0, 0, 0), (1, 1, 1)), moving=True),
     }  # fmt: skip
 
 
@@ -154,7 +154,7 @@ def everything():
         ({"pairs": [[0, 12]]}, r"position must have shape \(13, 3\)"),
         (
             {"meshes": (np.eye(3), [[0, 1, 3]], np.eye(3))},
-            "triangles must hold indices from 0 to 2",
+            "triangles must hold indices",
         ),
         (
             {"meshes": (np.eye(3), [[0, 1, 2]], np.eye(3)[:2])},
@@ -185,7 +185,10 @@ def test_values_that_do_not_fit_are_refused(tmp_path, refused, changed, match):
         (lambda: group(ids=np.zeros(COUNT, int)), "ids must be different"),
         (lambda: MeshPrim(0, "x", BLUE, slice(0, 3)), "triangles must be given with indices"),
         (lambda: MeshPrim(0, "x", BLUE, slice(0, 3), [[0, 1, 3]]), "hold indices from 0 to 2"),
-        (lambda: Shape.mesh(np.eye(3), [[0, 1, 3]]), "triangles must hold indices from 0 to 2"),
+        (
+            lambda: Shape("mesh", (np.eye(3), [[0, 1, 3]])),
+            "triangles must hold indices",
+        ),
         (lambda: StageInfo(points=[group()], layout={0: (1, 2)}), r"layout must have shape \(3,\)"),
     ],
 )

@@ -183,7 +183,7 @@ class _Root:
 
     def shape(self, shape: Shape, path: Sdf.Path, pose: np.ndarray | None) -> None:
         first, second = shape.parameters
-        clear = shape.container
+        clear = shape.clear
         if shape.kind == "plane":
             spec = self._plane(shape, path, pose)
         elif shape.kind == "box":
@@ -211,7 +211,7 @@ class _Root:
         corners = square_on(own, point, normal, half or 1.0)
         if pose is not None:
             corners = (corners - pose[3, :3]) @ pose[:3, :3].T
-        return self._still(path, corners, np.arange(4)[None], shape, shape.container or behind)
+        return self._still(path, corners, np.arange(4)[None], shape, shape.clear or behind)
 
     def _boundary(self, path: Sdf.Path, shape: Shape, clear: bool) -> Sdf.PrimSpec:
         """The mesh of a boundary, without its points."""
