@@ -159,7 +159,7 @@ _HEAD = {
     const int first = {elements("pairs.begin", "int")}[w], last = {elements("pairs.end", "int")}[w];
 """,
 }
-_PARTNER = {ROWS: "row[k]", ALL: "k"}
+_PARTNER = {ROWS: "row[{}]", ALL: "{}"}
 _INSIDE = {ROWS: "r2 < p.cutoff_squared", ALL: "(j != i) & (r2 < p.cutoff_squared)"}
 
 
@@ -171,25 +171,29 @@ def native_loop(
 
     Outside the cutoff the term is evaluated at a harmless distance and multiplied away by a
     select, so the loop has no branch of its own. Rows must be contiguous (entry stride 1).
+
+    The term is called once before, for nothing but what it reads of i, which the compiler then
+    keeps: within the loop, where it is called only inside the cutoff, a read may not be moved.
     """
     real, Box, total = precision.c, box_type(precision), precision.vector(width)
     unit, vec3, sums = precision.scalar(1.0), precision.vec3, range(width)
+    call, partner, vec = native_name(term), _PARTNER[partners].format, vector(3, real)
     snippet = f"""{_HEAD[partners]}
     const {real}* x = {elements("d.x", real)};
     const {real} xi = x[3*i], yi = x[3*i+1], zi = x[3*i+2];
     {"".join(f"{real} sum{s} = 0; " for s in sums)}
-    {{
+    if (first < last) {{
 #pragma clang fp reassociate(on) contract(fast)
+    {call}(i, {partner("first")}, {vec}(1, 0, 0), 1, d, p);
 #pragma clang loop vectorize(enable)
     for (int k = first; k < last; ++k) {{
-        const int j = {_PARTNER[partners]};
+        const int j = {partner("k")};
         {real} dx = xi - x[3*j], dy = yi - x[3*j+1], dz = zi - x[3*j+2];
         {native_image(precision, periodic)}
         const {real} r2 = dx*dx + dy*dy + dz*dz;
         const bool inside = {_INSIDE[partners]};
         const {real} safe = inside ? r2 : ({real})1;
-        const {vector(width, real)} t =
-            {native_name(term)}(i, j, {vector(3, real)}(dx, dy, dz), safe, d, p);
+        const {vector(width, real)} t = {call}(i, j, {vec}(dx, dy, dz), safe, d, p);
         {"".join(f"sum{s} += inside ? t[{s}] : ({real})0; " for s in sums)}
     }}
     }}
