@@ -3,8 +3,8 @@
 The derivative of ``wp.where(r < 1.0, wp.sqrt(1.0 - r), 0.0)`` at r = 1.5 is 0 times that of a root
 that there is not, which is no number. Laws have what a branch reads pass through :func:`taken` or
 :func:`passed`, whose derivatives select: nothing of the branch that is not taken comes through, and
-loops vectorise, as ``wp.where`` itself selects. What is computed beforehand for a branch only, by
-what has such derivatives, is computed within it.
+loops vectorise, as ``wp.where`` itself selects. What is computed beforehand by what has such
+derivatives selects what it reads if it is for one branch only, and else is computed within each.
 """
 
 # ruff: noqa: F811, the functions are overloaded
@@ -63,6 +63,9 @@ def derivable(tree: ast.Module, is_where: Callable[[ast.AST], bool]) -> ast.Modu
         return tree
     choices = _Choices(definition, is_where)
     definition = choices.visit(definition)
+    for statement in definition.body:
+        if _assigned(statement) in choices.kept:
+            statement.value = choices.fixed[_assigned(statement)]
     # Backwards: what was moved may have been all that read what was moved before it. Statements
     # stay as many as they were, for errors to be found again.
     for k in reversed(range(len(definition.body))):
@@ -76,6 +79,7 @@ class _Choices(ast.NodeTransformer):
     def __init__(self, definition: ast.FunctionDef, is_where: Callable[[ast.AST], bool]):
         self.is_where = is_where
         self.moved: set[str] = set()
+        self.kept: set[str] = set()  # those of one branch only, which select where they stand
         nodes = list(ast.walk(definition))
         written = Counter(
             node.id for node in nodes if isinstance(node, ast.Name) and not _is_read(node)
@@ -87,7 +91,8 @@ class _Choices(ast.NodeTransformer):
             if isinstance(node, ast.Subscript | ast.Attribute) and not _is_read(node)
             for each in ast.walk(node) if isinstance(each, ast.Name)
         )  # fmt: skip
-        self.own = set(written)
+        self.own, self.written = set(written), written
+        self.reads = _reads(definition)
         # What is written once, of what is written once: it is the same wherever it is computed.
         self.fixed: dict[str, ast.expr] = {}
         for statement in definition.body:
@@ -99,26 +104,57 @@ class _Choices(ast.NodeTransformer):
                     self.fixed[name] = value
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
+        reads = [_reads(each) for each in node.args[1:]]
         node = ast.Call(node.func, [self.visit(each) for each in node.args], node.keywords)
         if not self.is_where(node.func) or len(node.args) != 3 or not self._is_bool(node.args[0]):
             return node
-        node.args[1:] = self._selected(*node.args)
+        node.args[1:] = self._selected(reads, *node.args)
         return node
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.AST:  # Warp makes wp.where of it
+        reads = [_reads(each) for each in (node.body, node.orelse)]
         node = ast.IfExp(*(self.visit(each) for each in (node.test, node.body, node.orelse)))
         if self._is_bool(node.test):
-            node.body, node.orelse = self._selected(node.test, node.body, node.orelse)
+            node.body, node.orelse = self._selected(reads, node.test, node.body, node.orelse)
         return node
 
-    def _selected(self, condition: ast.expr, *branches: ast.expr) -> list[ast.expr]:
-        """Both branches, with what they read selected."""
+    def _selected(
+        self, reads: list[Counter], condition: ast.expr, *branches: ast.expr
+    ) -> list[ast.expr]:
+        """Both branches, with what they read selected; ``reads``: how often they read a name."""
+        if isinstance(condition, ast.Name) and not self._chooses(self.fixed[condition.id]):
+            condition = self.fixed[condition.id]  # known as early as what it reads
         found = []
-        for name, branch in zip(("_taken_derived", "_passed_derived"), branches, strict=True):
-            inlined = _Inlined(self).visit(_copy(branch))
-            wild = self.is_wild(inlined)
-            found.append(_Selected(name, condition, self.own).visit(inlined) if wild else branch)
+        names = ("_taken_derived", "_passed_derived")
+        for name, branch, count in zip(names, branches, reads, strict=True):
+            kept = self._of_branch(condition, count)
+            select = _Selected(name, condition, self.own - kept)
+            for each in kept:
+                self.fixed[each] = select.visit(_copy(self.fixed[each]))
+            self.kept |= kept
+            inlined = _Inlined(self, kept).visit(_copy(branch))
+            found.append(select.visit(inlined) if kept or self.is_wild(inlined) else branch)
         return found
+
+    def _of_branch(self, condition: ast.expr, reads: Counter) -> set[str]:
+        """What is computed before for this branch only, if some of it is wild."""
+        inside, kept, order = reads.copy(), set[str](), list(self.fixed)
+        for k, name in reversed(list(enumerate(order))):
+            value = self.fixed[name]
+            ready = all(
+                each in order[:k] or (each not in self.fixed and self.written[each] <= 1)
+                for each in _read(condition)
+            )
+            if ready and inside[name] == self.reads[name] > 0 and not self._chooses(value):
+                kept.add(name)
+                inside.update(_reads(value))
+        return kept if any(self.is_wild(self.fixed[name]) for name in kept) else set()
+
+    def _chooses(self, node: ast.AST) -> bool:
+        return any(
+            isinstance(each, ast.IfExp) or (isinstance(each, ast.Call) and self.is_where(each.func))
+            for each in ast.walk(node)
+        )
 
     def _is_bool(self, node: ast.expr) -> bool:
         if isinstance(node, ast.Name) and node.id in self.fixed:
@@ -139,14 +175,14 @@ class _Choices(ast.NodeTransformer):
 
 
 class _Inlined(ast.NodeTransformer):
-    """What a branch reads, computed within it where that is wild."""
+    """What a branch reads, computed within it where that is wild, but for what is kept."""
 
-    def __init__(self, choices: _Choices):
-        self.choices = choices
+    def __init__(self, choices: _Choices, kept: set[str]):
+        self.choices, self.kept = choices, kept
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
         value = self.choices.fixed.get(node.id)
-        if value is None:
+        if value is None or node.id in self.kept:
             return node
         value = self.visit(self.choices.visit(_copy(value)))
         if not self.choices.is_wild(value):
@@ -174,7 +210,13 @@ class _Selected(ast.NodeTransformer):
 
 def _read(tree: ast.AST) -> set[str]:
     """The names that are read."""
-    return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and _is_read(node)}
+    return set(_reads(tree))
+
+
+def _reads(tree: ast.AST) -> Counter:
+    """The names that are read, and how often."""
+    nodes = ast.walk(tree)
+    return Counter(each.id for each in nodes if isinstance(each, ast.Name) and _is_read(each))
 
 
 def _is_read(node: ast.AST) -> bool:

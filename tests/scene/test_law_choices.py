@@ -1,11 +1,14 @@
 """Derivatives of laws that choose: those of the branch that is taken, and nothing of the other."""
 
+import ast
+
 import numpy as np
 import pytest
 import warp as wp
 
 import particlesim as ps
 from particlesim.engine.model import Model
+from particlesim.kernels.choices import derivable
 
 
 @ps.law
@@ -61,12 +64,48 @@ def divided(r: float, k: float):
     return wp.where(r < 1.0, k * (1.0 - r) / wp.pow(1.0 - r, 0.5), 0.0)
 
 
+@ps.law
+def of_both_branches(r: float, k: float):
+    root = wp.sqrt(1.0 - r)
+    again = root * k
+    # Beyond 1 the root is none, and read all the same, in what nobody asks for.
+    far = wp.where(r < 2.0, 0.0, root)
+    return wp.where(r < 1.0, again, far)
+
+
+@ps.law
+def nested_of_one_branch(r: float, k: float):
+    left = 1.0 - r
+    root = wp.sqrt(left)
+    deep = wp.log(1.0 - 2.0 * r)
+    inner = wp.where(r < 0.5, deep + r * root, k * root)
+    return wp.where(r < 1.0, inner, 0.0)
+
+
+@ps.law
+def beside_what_is_computed_before(r: float, k: float):
+    # What a root that is none is multiplied with is read too.
+    root = wp.sqrt(1.0 - r)
+    return wp.where(r < 1.0, (k + r - r) * root, r - r)
+
+
+@ps.law
+def asked_of_what_is_computed_before(r: float, k: float):
+    left = 1.0 - r
+    root = k * wp.sqrt(left)
+    return wp.where(left > 0.0, root, 0.0)
+
+
 @pytest.fixture(params=[True, False], ids=["vectorised", "plain"])
 def vectorised(request, monkeypatch):
     monkeypatch.setattr(Model, "vectorised", request.param)
 
 
-LAWS = [direct, other_way, by_if, computed_before, written_again, by_helper, nested, divided]
+LAWS = [
+    direct, other_way, by_if, computed_before, written_again, by_helper, nested, divided,
+    of_both_branches, nested_of_one_branch, beside_what_is_computed_before,
+    asked_of_what_is_computed_before,
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
@@ -97,6 +136,19 @@ def test_of_vectors(precision):
     expected = [[0, 0, 0], [0.6 / 0.8, 0, 0]]
     few = 10 * float(np.finfo(precision).eps)
     np.testing.assert_allclose(sim.get("force"), expected, rtol=few, atol=0)
+
+
+def test_nothing_is_computed_twice():
+    """What is computed before a choice, for one branch, stays so: it costs what it did."""
+    source = """
+def choice(r: float, epsilon: float):
+    s2 = epsilon / (r * r)
+    s6 = s2 * s2 * s2
+    near = r < 2.0
+    return wp.where(near, s6 * s6 - s6, 0.0)
+"""
+    tree = derivable(ast.parse(source), lambda node: ast.unparse(node) == "wp.where")
+    assert ast.unparse(tree).count("/") == 1
 
 
 def test_what_is_wild_where_it_is_asked_stays_so():
