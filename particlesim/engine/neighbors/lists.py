@@ -50,6 +50,7 @@ class Neighbors:
     def __init__(self, model: Model):
         self.model = model
         self.lists: list[AllPairs] = []
+        self.verlet: list[VerletList] = []  # those with rows
         self.requests: list[Request] = []
         self._of: dict[int, AllPairs] = {}
 
@@ -155,6 +156,7 @@ class Neighbors:
     def allocate(self, state: State) -> None:
         """Make all lists, once every user has asked."""
         self._agree()
+        self.verlet = [each for each in self.lists if isinstance(each, VerletList)]
         for each in self.lists:
             each.allocate(state)
 
@@ -179,11 +181,6 @@ class Neighbors:
     def generation(self) -> int:
         """Changes when rows have moved to new arrays; what was recorded before is then void."""
         return sum(each.generation for each in self.verlet)
-
-    @property
-    def verlet(self) -> list[VerletList]:
-        """The lists with rows."""
-        return [each for each in self.lists if isinstance(each, VerletList)]
 
     @property
     def overflowing(self) -> bool:
