@@ -78,7 +78,10 @@ def _kernel(vectorised: bool) -> wp.Kernel:
         sums_out: wp.array(dtype=PAIR),
     ):
         i = first + wp.tid()
-        pairs.count[i] = of_cells(i, grid, x[i], Cells(), slot, pairs, Box(), planes, real(1.0))
+        one = real(1.0)
+        pairs.count[i] = of_cells(
+            i, 0, grid, x[i], one, Cells(), slot, SPARE, pairs, Box(), planes, one
+        )
         d = Data()
         d.x = x
         p = Params()
@@ -99,7 +102,7 @@ def _sums(vectorised: bool) -> np.ndarray:
         grid.build(x, 1.0)
         pairs = Pairs()
         pairs.count, pairs.index = wp.zeros(2, dtype=int), wp.zeros(4 * SPARE, dtype=int)
-        pairs.capacity, pairs.row_stride, pairs.entry_stride = SPARE, 2 * SPARE, 1
+        pairs.row, pairs.entry_stride = wp.array([0, 2 * SPARE], dtype=wp.int64), 1
         sums = wp.full(2, value=PAIR(np.nan), dtype=PAIR)
         slot = wp.array([0, 1], dtype=int)
         inputs: list[Any] = [0, grid.id, slot, planes, x, pairs, sums]

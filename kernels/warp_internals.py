@@ -262,16 +262,16 @@ def vector(width: int, c: str) -> str:
     return f"wp::vec_t<{width},{c}>"
 
 
-def grid_runs(grid: str, point: str, c: str, visit: str) -> str:
+def grid_runs(grid: str, point: str, radius: str, visit: str) -> str:
     """C++: ``visit`` for every run, from ``begin`` to ``end``, of the points around ``point``.
 
     The points, in the order of ``wp.hash_grid_point_id``, of all cells that ``wp.hash_grid_query``
-    would look through for a radius of 1, whole runs of neighbouring cells at a time.
+    would look through for that radius, whole runs of neighbouring cells at a time.
 
     Rests on: the members of ``hash_grid_query_t`` and ``HashGrid_t``, and ``hash_grid_index``.
     """
     return f"""
-    auto around = wp::hash_grid_query({grid}, {point}, ({c})1);
+    auto around = wp::hash_grid_query({grid}, {point}, {radius});
     const auto& g = around.grid;
     const int first_x = ((around.x_start % g.dim_x) + g.dim_x) % g.dim_x;
     for (int z = around.z_start; z <= around.z_end; ++z)

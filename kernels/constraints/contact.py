@@ -64,9 +64,8 @@ def slack_kernels(precision: Precision, periodic: Periodicity) -> tuple[wp.Kerne
         i = pairs.order[s]
         x_i = b.x[i] - b.v[i] * dt  # where the substep began: the way since is no overlap
         factor = real(1.0)
-        row = wp.int64(s) * pairs.row_stride
-        for k in range(wp.min(pairs.count[s], pairs.capacity)):
-            j = pairs.order[pairs.index[row + wp.int64(k) * pairs.entry_stride]]
+        for k in range(pairs.count[s]):
+            j = pairs.order[pairs.index[pairs.row[s] + wp.int64(k) * pairs.entry_stride]]
             reach = radius[i] + radius[j]
             r = wp.length(image(x_i - (b.x[j] - b.v[j] * dt), box[world]))
             if r < factor * reach and b.w[i] + b.w[j] > real(0.0):

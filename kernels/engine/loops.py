@@ -48,10 +48,9 @@ class Pairs:
     begin: wp.array(dtype=wp.int32)  # world -> first slot
     end: wp.array(dtype=wp.int32)  # world -> last slot + 1
     count: wp.array(dtype=wp.int32)  # slot -> entries of its row
+    row: wp.array(dtype=wp.int64)  # slot -> where its row begins
     index: wp.array(dtype=wp.int32)  # the rows, slots
-    row_stride: wp.int64
     entry_stride: wp.int64
-    capacity: wp.int32
 
 
 def box_type(precision: Precision) -> Any:
@@ -129,10 +128,11 @@ def plain_loop(
     def plain_sum(i: int, pairs: Pairs, box: Box, d: data, p: params):
         x_i = d.x[i]
         result = total()
-        row = wp.int64(i) * pairs.row_stride
+        row = wp.int64(0)
         if wp.static(rows):
+            row = pairs.row[i]
             first = 0
-            last = wp.min(pairs.count[i], pairs.capacity)
+            last = pairs.count[i]
         else:
             first = pairs.begin[pairs.world[i]]
             last = pairs.end[pairs.world[i]]
@@ -151,9 +151,8 @@ def plain_loop(
 
 _HEAD = {
     ROWS: f"""
-    const int found = {elements("pairs.count", "int")}[i];
-    const int first = 0, last = found < pairs.capacity ? found : pairs.capacity;
-    const int* row = {elements("pairs.index", "int")} + (long long)i * pairs.row_stride;""",
+    const int first = 0, last = {elements("pairs.count", "int")}[i];
+    const int* row = {elements("pairs.index", "int")} + {elements("pairs.row", "long long")}[i];""",
     ALL: f"""
     const int w = {elements("pairs.world", "int")}[i];
     const int first = {elements("pairs.begin", "int")}[w], last = {elements("pairs.end", "int")}[w];

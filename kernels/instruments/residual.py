@@ -79,9 +79,8 @@ def contact_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
         s = first + wp.tid()
         i = pairs.order[s]
         deepest = real(0.0)
-        row = wp.int64(s) * pairs.row_stride
-        for k in range(wp.min(pairs.count[s], pairs.capacity)):
-            j = pairs.order[pairs.index[row + wp.int64(k) * pairs.entry_stride]]
+        for k in range(pairs.count[s]):
+            j = pairs.order[pairs.index[pairs.row[s] + wp.int64(k) * pairs.entry_stride]]
             r = wp.length(image(b.x[i] - b.x[j], box[pairs.world[s]]))
             if b.w[i] + b.w[j] > real(0.0):
                 deepest = wp.max(deepest, radius[i] + radius[j] - r)

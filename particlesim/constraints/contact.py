@@ -41,6 +41,9 @@ class Contact(EasedConstraint):
     no more than ``Settings.depenetration_speed``. A particle that passes through the middle of
     another in one substep is stopped where it came from; one that passes it altogether is missed.
 
+    Radii may differ as they like: a large particle among many small ones costs no more than the
+    contacts that it has, since who may touch whom is looked for by size.
+
     A stack rests on overlaps: those of the lowest layer are a few times layers times g dt^2, which
     smaller substeps, or else more iterations, reduce.
 
@@ -85,7 +88,7 @@ class Contact(EasedConstraint):
         if not self.count:
             return
         self.pairs = neighbors.request(
-            self.name, members, 2.0 * largest, {"position"}, for_constraint=True
+            self.name, members, 2.0 * largest, {"position"}, for_constraint=True, half=radius
         )
         # A world of points has no contacts, and no list.
         self.cutoff = 2.0 * np.where(largest > 0, largest, largest.max())

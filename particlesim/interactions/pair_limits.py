@@ -139,7 +139,7 @@ def forces(part: Any, probe: Probe, w: int, couples: np.ndarray, r: np.ndarray) 
     pairs.world = model.array(np.full(2 * count, w), wp.int32)
     pairs.count = model.array(np.ones(2 * count), wp.int32)
     pairs.index = model.array(slots ^ 1, wp.int32)
-    pairs.capacity, pairs.row_stride, pairs.entry_stride = 1, 1, 1
+    pairs.row, pairs.entry_stride = model.array(slots, wp.int64), 1
     fields = {"x": model.array(x.astype(precision.numpy), precision.vec3)}
     for name in part.quantities - {"position"}:
         source = probe.state[name]

@@ -107,7 +107,7 @@ def test_rows_that_grow_within_a_run(execution, threads):
     assert sim.neighbors.lists[0].capacity > before
     # Against rows that were long enough from the start.
     roomy = ps.Simulation(scene, settings.replace(execution="graph"), device="cpu")
-    roomy.neighbors.lists[0]._resize(2000)
+    roomy.neighbors.lists[0]._resize(np.array([2000]))
     roomy.neighbors.lists[0].mark_all()
     roomy.run(15)
     assert roomy.neighbors.lists[0].generation == 2

@@ -14,7 +14,7 @@ def listed_pairs(sim):
     assert count.max(initial=0) <= rows.capacity
     found = set()
     for slot, n in enumerate(count):
-        at = slot * rows.pairs.row_stride + np.arange(n) * rows.pairs.entry_stride
+        at = rows.pairs.row.numpy()[slot] + np.arange(n) * rows.pairs.entry_stride
         partners = order[index[at]]
         assert len(set(partners)) == n  # nobody twice
         found |= {(int(order[slot]), int(j)) for j in partners}

@@ -119,7 +119,7 @@ def test_runs_of_a_grid_are_its_query(shape):
     snippet = f"""
     int* found = {internals.elements("seen", "int")} + row * {internals.columns("seen")};
     int n = 0;
-    {internals.grid_runs("grid", "u", "double", visit)}
+    {internals.grid_runs("grid", "u", "1.0", visit)}
     return n;
 """
     act = native(walk, snippet, after_gradients=False)

@@ -15,6 +15,7 @@ from ...scene.part import Interaction
 from ..model import Model
 from ..state import State
 from .all_pairs import AllPairs
+from .blocks import by_size
 from .verlet import VerletList
 
 SHARE = 1.25  # lists are shared up to this ratio of cutoffs: (5/4)^3 is twice the candidates
@@ -26,6 +27,7 @@ class Request:
 
     ``leader`` is, by world, the number of the request whose list this one shares, or its own; where
     a world asks for nothing it is -1. ``widest`` is what the list that it leads must reach there.
+    ``half`` is, by world, half the cutoff of each of its members if they differ much, else None.
     """
 
     members: np.ndarray
@@ -33,6 +35,7 @@ class Request:
     for_constraint: bool
     leader: np.ndarray
     widest: np.ndarray
+    half: list[np.ndarray | None]
     served_by: AllPairs = field(init=False, repr=False)
 
     def meets(self, other: Request) -> np.ndarray:
@@ -77,22 +80,28 @@ class Neighbors:
         names: set[str],
         *,
         for_constraint: bool = False,
+        half: np.ndarray | None = None,
     ) -> AllPairs:
         """The list for these members within ``cutoff`` (one a world; None: all pairs).
 
         ``names`` are the per-particle arrays to have in slot order. Lists of the same members
         are shared when their cutoffs are alike. Where the cutoff is 0 nothing is looked for.
+
+        ``half`` is for members of sizes of their own: i and j are looked for within the sum of
+        their halves, (members,), at most half the cutoff.
         """
         worlds = self.model.world_count
-        new = Request(
-            members, cutoff, for_constraint, np.full(worlds, -1),
-            np.zeros(worlds) if cutoff is None else cutoff.astype(float),
-        )  # fmt: skip
+        widest = np.zeros(worlds) if cutoff is None else cutoff.astype(float)
+        halves = self._halves(members, half)
+        new = Request(members, cutoff, for_constraint, np.full(worlds, -1), widest, halves)
         self._choose_leaders(new)
         found = self._fitting(new)
         if found is None:
             found = (AllPairs if cutoff is None else VerletList)(self.model, members)
             self.lists.append(found)
+        if isinstance(found, VerletList):
+            mine = zip(new.half, found.half, strict=True)
+            found.half = [theirs if ours is None else ours for ours, theirs in mine]
         found.request(names)
         found.users.append(user)
         for other in self.requests:
@@ -102,6 +111,14 @@ class Neighbors:
         new.served_by = found
         self.requests.append(new)
         return found
+
+    def _halves(self, members: np.ndarray, half: np.ndarray | None) -> list[np.ndarray | None]:
+        """By world those that differ so much that it pays to tell them apart."""
+        worlds = np.arange(self.model.world_count)
+        if half is None:
+            return [None] * len(worlds)
+        of_worlds = np.split(half, np.searchsorted(self.model.world_of[members], worlds[1:]))
+        return [each if by_size(each) else None for each in of_worlds]
 
     def _choose_leaders(self, new: Request) -> None:
         """In each world the first list that the request can share there, else one of its own."""
@@ -202,4 +219,8 @@ def _alike(new: Request, other: Request) -> np.ndarray:
     if new.cutoff is None or other.cutoff is None:
         return np.full(len(new.leader), new.cutoff is other.cutoff)
     least, most = np.minimum(new.widest, other.widest), np.maximum(new.widest, other.widest)
-    return most <= SHARE * least
+    sized = [
+        (ours is None) == (theirs is None)
+        for ours, theirs in zip(new.half, other.half, strict=True)
+    ]
+    return (most <= SHARE * least) & sized

@@ -3,11 +3,13 @@
 A list holds for every slot the slots nearer than cutoff + skin, and stays valid until a particle
 has moved half the skin; then the lists of that particle's world are rebuilt, and of no other, so
 that a world in a batch goes exactly as it goes alone. Worlds are kept apart by construction: a
-large world has a hash grid of its own, a small one is looked through directly.
+large world has hash grids of its own, one for each of its blocks, a small one is looked through
+directly.
 """
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -22,13 +24,13 @@ from ..execution.launch import call, launch, when
 from ..model import Model
 from ..state import State
 from .all_pairs import AllPairs
+from .blocks import blocks
+from .cells import grid_over
 
 # Skin over cutoff, where Settings leaves it open; measured. Grains have few partners, so that rows
 # cost little to hold and much to make.
 SKIN, SKIN_OF_CONTACTS = 0.12, 0.2
 DIRECT_CPU, DIRECT_CUDA = 512, 8192  # largest world that is looked through directly; measured
-CELLS_PER_PARTICLE = 4  # bounds the cost of clearing a grid
-MAX_CELLS = 256  # along an axis
 
 
 class VerletList(AllPairs):
@@ -39,18 +41,41 @@ class VerletList(AllPairs):
     def __init__(self, model: Model, members: np.ndarray):
         super().__init__(model, members)
         self.cutoff = np.zeros(model.world_count)  # 0: nothing is looked for in that world
-        self.capacity = self.generation = 0
-        self.grids: dict[int, tuple[wp.HashGrid, Any]] = {}
+        # By world: of particles that differ much in size, half the cutoff of each; else None.
+        self.half: list[np.ndarray | None] = [None] * model.world_count
+        self.generation = 0
+        self.grids: dict[int, tuple[wp.HashGrid, Any]] = {}  # by block
 
     def _choose_search(self) -> None:
         """Which worlds have a grid, and which are looked through directly."""
         sizes = (self.end_host - self.begin_host) * (self.cutoff > 0)
         limit = DIRECT_CPU if self.model.device.is_cpu else DIRECT_CUDA
-        self.grid_worlds = [int(w) for w in np.nonzero(sizes > limit)[0]]
-        small = (sizes > 0) & (sizes <= limit)
+        self.large, small = sizes > limit, (sizes > 0) & (sizes <= limit)
         self.has_direct = bool(small.any())
         self.direct = self.model.array(small, wp.int32)
-        self.sorted = self.sorted or bool(self.grid_worlds)
+        by_size = any(half is not None for half in self.half)
+        self.sorted = self.sorted or bool(self.large.any()) or by_size
+
+    def _cut(self, skin: np.ndarray) -> np.ndarray:
+        """Cut the worlds into blocks; returns the members in the order of their slots."""
+        cuts = list(blocks(self.begin_host, self.end_host, self.cutoff, skin, self.half))
+        self.blocks = [block for _, of_world, _ in cuts for block in of_world]
+        self.skin = np.array([thin for _, _, thin in cuts])
+        self.reach = np.where(self.cutoff > 0, self.cutoff + self.skin, np.inf)
+        struct = rows.blocks_type(self.model.precision)()
+        counts = [block.count for block in self.blocks]
+        reach = np.zeros((len(counts), max(len(of_world) for _, of_world, _ in cuts)))
+        for k, block in enumerate(self.blocks):
+            reach[k, : len(block.reach)] = block.reach
+        edges = np.cumsum([0, *(len(of_world) for _, of_world, _ in cuts)])
+        model, whole = self.model, wp.int32
+        struct.of = model.array(np.repeat(np.arange(len(counts)), counts), whole)
+        struct.begin = model.array([block.begin for block in self.blocks], whole)
+        struct.end = model.array([block.end for block in self.blocks], whole)
+        struct.first = model.array(edges, whole)
+        struct.reach_squared = model.array(reach**2, model.precision.scalar)
+        self.struct = struct
+        return self.members_host[np.concatenate([order for order, _, _ in cuts])]
 
     def allocate(self, state: State) -> None:
         model, device = self.model, self.model.device
@@ -59,15 +84,16 @@ class VerletList(AllPairs):
         self._choose_search()
         given = model.settings.skin
         share = np.where(self.for_interactions, SKIN, SKIN_OF_CONTACTS)
-        skin = self.cutoff * share if given is None else np.full_like(self.cutoff, given)
-        self.reach = np.where(self.cutoff > 0, self.cutoff + skin, np.inf)
+        members = self._cut(
+            self.cutoff * share if given is None else np.full_like(self.cutoff, given)
+        )
+        self.members = model.array(members, wp.int32)
         # A hair less than half the skin, for the rounding of the distances compared.
         margins = [
-            np.where(renewed, (0.4999 * skin) ** 2, np.inf)
+            np.where(renewed, (0.4999 * self.skin) ** 2, np.inf)
             for renewed in (self.for_interactions, self.for_constraints)
         ]
         self.margins_squared = [model.array(each, real) for each in margins]
-        self.reach_squared = model.array(self.reach**2, real)
         self.order = wp.clone(self.members)
         self.slot = wp.zeros(self.count, dtype=wp.int32, device=device)
         self.x_listed = wp.zeros(self.count, dtype=vec3, device=device)
@@ -76,12 +102,14 @@ class VerletList(AllPairs):
         self.any_moved = wp.zeros(1, dtype=wp.int32, device=device)
         self.overflow = wp.zeros(1, dtype=wp.int32, device=device)
         self.pairs.count = wp.zeros(self.count, dtype=wp.int32, device=device)
+        self.found = wp.zeros(self.count, dtype=wp.int32, device=device)
         super().allocate(state)
         self.planes = wp.zeros((3, self.count + rows.BLOCK), dtype=real, device=device)
-        start = state["position"].numpy()[self.members_host].astype(np.float64)
-        for w in self.grid_worlds:
-            self.grids[w] = self.grid_over(w, start[self.begin_host[w] : self.end_host[w]])
-        self._resize(32)
+        start = state["position"].numpy()[members].astype(np.float64)
+        for k, block in enumerate(self.blocks):
+            if self.large[block.world] and block.count:
+                self.grids[k] = grid_over(model, block, start[block.begin : block.end])
+        self._resize(np.full(len(self.blocks), 32))
         self.mark_all()
         self.update(state)
         self.grow()
@@ -97,52 +125,32 @@ class VerletList(AllPairs):
                         float(length), "enlarge the box or shorten the cutoff",
                     )  # fmt: skip
 
-    def grid_over(self, w: int, x: np.ndarray) -> tuple[wp.HashGrid, Any]:
-        """A hash grid sized to world w, and its cell coordinates."""
-        model, reach = self.model, max(float(self.reach[w]), 1e-30)
-        lower, upper = x.min(axis=0), x.max(axis=0)
-        # A little more than the reach, for the rounding of cell coordinates in float32.
-        cells = np.clip(np.floor((upper - lower) / (1.001 * reach)) + 1, 1, MAX_CELLS)
-        scale = np.full(3, 1.0 / (1.001 * reach))
-        for axis, on in enumerate(model.periodic):
-            if on:
-                length = model.box_length[w, axis]
-                cells[axis] = np.clip(np.floor(length / (1.001 * reach)), 1, MAX_CELLS)
-                lower[axis] = model.box_lower[w, axis]
-                upper[axis] = lower[axis] + length
-        budget = max(4096, CELLS_PER_PARTICLE * len(x))
-        while np.prod(cells) > budget:
-            cells[np.argmax(cells)] = np.ceil(cells.max() / 2)
-        for axis, on in enumerate(model.periodic):
-            if on:
-                scale[axis] = cells[axis] / model.box_length[w, axis]
-        axes, backward = _slowest_last(x)
-        turn = np.zeros((3, 3))
-        turn[range(3), axes] = np.where(backward, -scale, scale)[axes]
-        dimensions = (int(c) for c in cells[axes])
-        grid = wp.HashGrid(*dimensions, device=model.device, dtype=self._real)
-        grid.reserve(len(x))
-        place = kernels.cells_type(model.precision)()
-        place.origin = model.precision.vec3(*np.where(backward, upper, lower))
-        place.turn = model.precision.mat33(turn)
-        place.first, place.world = int(self.begin_host[w]), w
-        return grid, place
+    def _resize(self, room: np.ndarray) -> None:
+        """Rows of so many neighbours, by block: contiguous if vectorised, interleaved for CUDA.
+
+        Those of blocks by size are always contiguous, as they are of very different lengths.
+        """
+        model = self.model
+        stride = -(-(room + rows.SPARE) // 16) * 16
+        self.room = stride - rows.SPARE
+        self.generation += 1
+        counts = np.array([block.count for block in self.blocks])
+        of_slot = np.repeat(np.arange(len(counts)), counts)
+        contiguous = model.vectorised or len(counts) > model.world_count
+        if contiguous:
+            begin = np.concatenate([[0], np.cumsum(stride[of_slot])])
+        else:
+            self.room[:] = self.room.max()
+            begin = np.append(np.arange(self.count), self.count * stride.max())
+        self.index = wp.zeros(int(begin[-1]), dtype=wp.int32, device=model.device)
+        self.pairs.index, self.pairs.row = self.index, model.array(begin[:-1], wp.int64)
+        self.pairs.entry_stride = 1 if contiguous else max(1, self.count)
+        self.struct.room = model.array(self.room, wp.int32)
 
     @property
-    def _real(self) -> Any:
-        return self.model.precision.scalar
-
-    def _resize(self, capacity: int) -> None:
-        """Rows for ``capacity`` neighbours; contiguous if vectorised, else interleaved for CUDA."""
-        stride = -(-(capacity + rows.SPARE) // 16) * 16
-        self.capacity = stride - rows.SPARE
-        self.generation += 1
-        self.index = wp.zeros(self.count * stride, dtype=wp.int32, device=self.model.device)
-        pairs = self.pairs
-        pairs.index, pairs.capacity = self.index, self.capacity
-        contiguous = self.model.vectorised
-        pairs.row_stride = stride if contiguous else 1
-        pairs.entry_stride = 1 if contiguous else max(1, self.count)
+    def capacity(self) -> int:
+        """Neighbours that the longest rows have room for."""
+        return int(self.room.max())
 
     def mark_all(self) -> None:
         """Have the next update rebuild every world."""
@@ -188,37 +196,42 @@ class VerletList(AllPairs):
 
     def rebuild(self) -> None:
         """Make the rows of the worlds marked as moved from ``x_listed``, and unmark them."""
-        for w in self.grids:
+        for w in sorted({self.blocks[k].world for k in self.grids}):
             with when(self.moved[w : w + 1]):
-                self._rebuild_grid(w)
+                self._rebuild_grids(w)
         if self.has_direct:
             self._rebuild_direct()
         call(self.moved.zero_)
         call(self.any_moved.zero_)
 
-    def _rebuild_grid(self, w: int) -> None:
+    def _rebuild_grids(self, w: int) -> None:
         model, device = self.model, self.model.device
-        grid, place = self.grids[w]
-        begin, count = int(self.begin_host[w]), int(self.end_host[w] - self.begin_host[w])
-        u = self.cell_coordinate[begin : begin + count]
+        mine = [(self.blocks[k], *grid) for k, grid in self.grids.items()]
+        mine = [each for each in mine if each[0].world == w]
         to_cells = kernels.cell_coordinates_kernel(model.precision)
-        launch(to_cells, count, [place, self.x_listed, self.cell_coordinate], device)
-        call(lambda: grid.build(u, 1.0))
-        launch(
-            kernels.build_kernels(model.precision).sort_slots,
-            count,
-            [grid.id, place, self.members, self.x_listed, self.order, self.slot,
-             self.planes],
-            device,
-        )  # fmt: skip
+        sort = kernels.build_kernels(model.precision).sort_slots
+        for block, grid, place in mine:
+            u = self.cell_coordinate[block.begin : block.end]
+            launch(to_cells, block.count, [place, self.x_listed, self.cell_coordinate], device)
+            call(functools.partial(grid.build, u, 1.0))
+            launch(
+                sort,
+                block.count,
+                [grid.id, place, self.members, self.x_listed, self.order, self.slot, self.planes],
+                device,
+            )
         make = rows.grid_rows_kernel(model.precision, model.periodic, model.vectorised)
-        launch(
-            make,
-            count,
-            [grid.id, place, model.box, self.reach_squared, self.slot, self.planes,
-             self.pairs, self.overflow],
-            device,
-        )  # fmt: skip
+        for block, _, _ in mine:
+            for k, (other, grid, place) in enumerate(mine):
+                reach = block.reach[k]
+                launch(
+                    make,
+                    block.count,
+                    [grid.id, place, block.begin, reach / other.own, int(k > 0),
+                     model.box, reach**2, self.struct, self.slot, self.planes, self.pairs,
+                     self.found, self.overflow],
+                    device,
+                )  # fmt: skip
 
     def _rebuild_direct(self) -> None:
         model = self.model
@@ -228,7 +241,7 @@ class VerletList(AllPairs):
         launch(
             make,
             self.count,
-            [self.direct, model.box, self.reach_squared, self.moved, self.planes, self.pairs,
+            [self.direct, model.box, self.moved, self.struct, self.planes, self.pairs, self.found,
              self.overflow],
             model.device,
         )  # fmt: skip
@@ -237,9 +250,13 @@ class VerletList(AllPairs):
         """If a row was full: make room for as many as were found. The rows are then empty."""
         if not self.overflow.numpy()[0]:
             return False
+        found = self.found.numpy()
+        longest = [found[each.begin : each.end].max(initial=0) for each in self.blocks]
+        full = np.array(longest) > self.room
         # The rows that were full may have been those of an earlier substep: always longer than now.
-        longest = max(int(self.pairs.count.numpy().max()), self.capacity)
-        self._resize(int(1.25 * longest) + 8)
+        full |= not full.any()
+        longer = 1.25 * np.maximum(longest, self.room) + 8
+        self._resize(np.where(full, longer.astype(int), self.room))
         self.overflow.zero_()
         return True
 
@@ -255,35 +272,26 @@ class VerletList(AllPairs):
         grids = ["{} x {} x {}".format(*grid_shape(grid)) for grid, _ in self.grids.values()]
         how = f"hash grid {grids[0]}" if grids else "direct search"
         how += f" and {len(grids) - 1} more" if len(grids) > 1 else ""
-        mean = np.minimum(self.pairs.count.numpy(), self.capacity).sum() / max(1, self.count)
-        reach = self.reach[self.cutoff > 0].max(initial=0.0)
+        mean = self.pairs.count.numpy().sum() / max(1, self.count)
+        looking = [block for block in self.blocks if self.cutoff[block.world] > 0]
+        least = min((block.reach.min() for block in looking), default=0.0)
+        most = max((block.reach.max() for block in looking), default=0.0)
+        reach = f"{most:g}" if least == most else f"{least:g} to {most:g}"
         return (
-            f"within {reach:g} of {self.count} particles, {mean:.0f} neighbours on "
+            f"within {reach} of {self.count} particles, {mean:.0f} neighbours on "
             f"average, room for {self.capacity}, {how}, for {', '.join(self.users)}"
         )
 
     @property
     def memory(self) -> int:
-        own = [self.x_listed, self.cell_coordinate, self.slot, self.index, self.pairs.count]
+        own = [self.x_listed, self.cell_coordinate, self.slot, self.index, self.pairs.count,
+               self.pairs.row, self.found]  # fmt: skip
         return super().memory + sum(a.capacity for a in own)
 
     def neighbors_of(self, particle: int) -> np.ndarray:
         """Particles in the row of ``particle``: all within the cutoff, and some in the skin."""
         order = self.order.numpy()
         slot = int(np.nonzero(order == particle)[0][0])
-        count = min(int(self.pairs.count.numpy()[slot]), self.capacity)
-        at = slot * self.pairs.row_stride + np.arange(count) * self.pairs.entry_stride
+        entries = np.arange(self.pairs.count.numpy()[slot])
+        at = self.pairs.row.numpy()[slot] + entries * self.pairs.entry_stride
         return order[self.index.numpy()[at]]
-
-
-def _slowest_last(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Axes by how far particles in their own order advance along them, and which go backward.
-
-    A grid numbers its cells by the last axis first. Where that is the order of the particles too,
-    what a thread writes by particle it reads by slot: two threads ran SPH 2.05 instead of 1.7 times
-    as fast as one.
-    """
-    index = np.arange(len(x)) - 0.5 * (len(x) - 1)
-    spread = np.maximum(x.std(axis=0), np.finfo(float).tiny)
-    trend = index @ (x - x.mean(axis=0)) / spread
-    return np.argsort(np.abs(trend), kind="stable"), trend < 0

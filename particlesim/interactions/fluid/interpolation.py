@@ -9,6 +9,7 @@ import warp as wp
 
 from ... import validate
 from ...engine.execution.launch import launch
+from ...engine.neighbors.cells import grid_over
 from ...kernels.engine.neighbors import cell_coordinates_kernel
 from ...kernels.interactions import sph as kernels
 from .sph import SPH
@@ -71,7 +72,8 @@ def _sums(sph: SPH, world: int, slots: slice, where: np.ndarray, samples: np.nda
     precision = model.precision
     x = sph.pairs.fields["position"][slots]
     host = x.numpy().astype(np.float64)
-    grid, cells = sph.pairs.grid_over(world, host)
+    block = next(each for each in sph.pairs.blocks if each.world == world)
+    grid, cells = grid_over(model, block, host)
     cells.first = 0  # of the slots at hand
     points = model.array(model.wrapped(where, world)[0], precision.vec3)
     # Points out of reach look into the outermost cells, so that cell numbers stay small.

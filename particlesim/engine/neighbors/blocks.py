@@ -1,0 +1,99 @@
+"""Blocks: the slots of a list by world and, where its particles differ much in size, by size.
+
+A pair is looked for within what its two blocks reach together. With one block for all, a single
+large particle has every small one look as far as two large ones would.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+LESS = 4.0  # times fewer candidates, from which blocks by size pay
+MOST = 8  # sizes of a world; those from a 128th of the largest down are one
+FEW = 64  # particles that may well look at each other all
+
+
+@dataclass(frozen=True)
+class Block:
+    """Slots of one world from ``begin`` to ``end - 1``, and how far they reach.
+
+    ``reach`` is, for each block of the world in turn, cutoff + skin of a pair with that one;
+    ``own`` that of two of this block, or enough of the largest for cells of that width.
+    """
+
+    world: int
+    begin: int
+    end: int
+    reach: np.ndarray
+    own: float
+
+    @property
+    def count(self) -> int:
+        """Its slots."""
+        return self.end - self.begin
+
+
+def _octaves(half: np.ndarray) -> np.ndarray:
+    """By how many halvings each is smaller than the largest."""
+    with np.errstate(divide="ignore"):
+        return np.clip(np.floor(np.log2(half.max() / half)), 0, MOST - 1).astype(int)
+
+
+def _largest(half: np.ndarray, octave: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The octaves that there are, how many are in each, and the largest of each."""
+    kinds, kind, count = np.unique(octave, return_inverse=True, return_counts=True)
+    largest = np.zeros(len(kinds))
+    np.maximum.at(largest, kind, half)
+    return kinds, count, largest
+
+
+def by_size(half: np.ndarray) -> bool:
+    """Whether blocks by size pay for the particles of one world.
+
+    Args:
+        half: Half the distance within which each looks for its like, (n,).
+    """
+    if len(half) <= FEW or not half.max() > 0:
+        return False
+    _, count, largest = _largest(half, _octaves(half))
+    candidates = count @ (largest[:, None] + largest) ** 3 @ count
+    return bool(len(half) ** 2 * (2 * half.max()) ** 3 > LESS * candidates)
+
+
+def blocks(
+    begin: np.ndarray,
+    end: np.ndarray,
+    cutoff: np.ndarray,
+    skin: np.ndarray,
+    half: list[np.ndarray | None],
+) -> Iterator[tuple[np.ndarray, list[Block], float]]:
+    """World by world: its members in the order of their slots, its blocks, and its skin.
+
+    Args:
+        begin: First slot of each world, (worlds,). end: Its last slot + 1.
+        cutoff: Of each world, 0 where nothing is looked for.
+        skin: Of each world, if it is one block.
+        half: Of each world in blocks by size half the cutoff of its members, else None.
+    """
+    for w, (a, b) in enumerate(zip(begin, end, strict=True)):
+        sizes = half[w]
+        if sizes is None:
+            reach = float(cutoff[w] + skin[w]) if cutoff[w] > 0 else np.inf
+            whole = Block(w, int(a), int(b), np.array([reach]), reach)
+            yield np.arange(a, b), [whole], float(skin[w])
+            continue
+        octave = _octaves(sizes)
+        _, count, largest = _largest(sizes, octave)
+        # Those that are most are renewed most: the skin is theirs.
+        thin = float(skin[w] * largest[count.argmax()] / largest.max())
+        edges = a + np.concatenate([[0], np.cumsum(count)])
+        reach = largest[:, None] + largest + thin
+        own = np.maximum(reach.diagonal(), reach.max() / 2**MOST)
+        cut = [
+            Block(w, int(edges[k]), int(edges[k + 1]), reach[k], float(own[k]))
+            for k in range(len(count))
+        ]
+        yield a + np.argsort(octave, kind="stable"), cut, thin
