@@ -15,7 +15,7 @@ from ..engine.integrate import compensated_sum
 from ..engine.loops import Periodicity, box_type, minimum_image
 from ..precision import APART, Precision, function, function_from_source, register, structure
 
-LARGEST = 1.0e30  # a multiplier beyond it, or NaN, comes of a gradient that does not exist
+LARGEST = 1.0e30  # C / |grad C|^2 beyond it, or NaN, comes of a gradient that does not exist
 
 
 @dataclass(frozen=True)
@@ -208,8 +208,10 @@ def project_kernel(law: Solved) -> wp.Kernel:
         x, e, _X, C, G = view(r, box, t, b)
         w = weights()
         s = real(0.0)
+        total = real(0.0)
         for a in range(wp.static(size)):
             w[a] = b.w[ids[a]]
+            total += w[a]
             if wp.static(unit):
                 s += w[a]
             else:
@@ -228,7 +230,7 @@ def project_kernel(law: Solved) -> wp.Kernel:
                 new = real(0.0)
         d_lam = new - lam
         # All pinned, or no gradient (a comparison with NaN is false): nothing sensible to do.
-        if s > real(0.0) and wp.abs(d_lam) < real(LARGEST):
+        if s > real(0.0) and wp.abs(d_lam) * total < real(LARGEST):
             t.lam[r] = new
             for a in range(wp.static(size)):
                 place(ids[a], x[a], e[a], G[a] * (w[a] * d_lam), b)

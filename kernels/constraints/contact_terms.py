@@ -136,8 +136,9 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
         if wp.static(friction):
             t = u - n * wp.dot(u, n)
             length = wp.sqrt(wp.dot(t, t))
-            split = wp.max(both(d.grip, i, j), real(1.0e-30))
-            limit = p.friction * lam / wp.max(length, real(1.0e-30))
+            split = both(d.grip, i, j)
+            split = wp.where(split > real(0.0), split, real(1.0))  # of two pinned ones: nothing
+            limit = p.friction * lam / wp.where(length > real(0.0), length, real(1.0))
             result = result - t * wp.min(real(1.0) / split, limit)
         return result
 

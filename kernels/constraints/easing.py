@@ -7,12 +7,13 @@ at a bounded speed.
 
 import functools
 
+import numpy as np
 import warp as wp
 
 from ..precision import Precision, function, structure
 
 SMALLEST = 0.01  # parts of the radius: below it slack runs out evenly, above it by e-folds
-GONE = 1.0e-30  # slack that counts as none, so that what decays by e-folds ends before denormals
+GONE = 2.0**20  # smallest numbers: slack that counts as none, before e-folds come to denormals
 
 
 @functools.cache
@@ -28,6 +29,7 @@ def easing_type(precision: Precision):
 def ease_function(precision: Precision) -> wp.Function:
     """``ease(slack, radius, dt, easing)``: what is left of the slack after dt."""
     real, Easing = precision.scalar, easing_type(precision)
+    gone = GONE * float(np.finfo(precision.numpy).tiny)
 
     def ease(slack: real, radius: real, dt: real, easing: Easing):
         pace = wp.max(slack, real(SMALLEST) * radius) * easing.rate
@@ -35,6 +37,6 @@ def ease_function(precision: Precision) -> wp.Function:
         if limit > real(0.0):  # points without a set speed have no scale of their own
             pace = wp.min(pace, limit)
         left = slack - pace * dt
-        return wp.where(left > real(GONE), left, real(0.0))
+        return wp.where(left > real(gone), left, real(0.0))
 
     return function(ease)

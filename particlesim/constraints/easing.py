@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from ..engine.model import Model
@@ -29,7 +30,7 @@ class Easing:
         self.marked = wp.ones(model.world_count, dtype=wp.int32, device=model.device)
         self.any_marked = wp.ones(1, dtype=wp.int32, device=model.device)
         settings = model.settings
-        frame = max(settings.dt, 1e-30)
+        frame = max(settings.dt, float(np.finfo(model.precision.numpy).tiny))
         speed = settings.depenetration_speed
         self.struct = easing_type(model.precision)()
         self.struct.speed = 0.0 if speed is None else speed / ends

@@ -15,7 +15,8 @@ from ..engine.model import Model, filled, structure_of
 from ..kernels.interactions.pair import pair_kernel
 from ..scene.law import Law
 
-# Closer than this, particles count as coincident: in parts of the cutoff, and without a cutoff.
+# Closer than this, particles count as coincident: in parts of the cutoff, or without a cutoff of
+# how far the particles of a world are apart at the start.
 COINCIDENT, CLOSEST = 1e-6, 1e-12
 OWN = {"cutoff_squared", "closest_squared"}  # parameters of every loop
 
@@ -75,11 +76,18 @@ def squared_distances(model: Model, cutoff: np.ndarray | None) -> dict[str, np.n
     Args:
         cutoff: One a world; None: all pairs.
     """
-    if cutoff is None:
-        most = np.finfo(model.precision.numpy).max
-        columns = {"cutoff_squared": most, "closest_squared": CLOSEST**2}
-        return {name: np.full(model.world_count, value) for name, value in columns.items()}
-    return {"cutoff_squared": cutoff**2, "closest_squared": (COINCIDENT * cutoff) ** 2}
+    numbers = np.finfo(model.precision.numpy)
+    if cutoff is not None:
+        most, closest = cutoff**2, COINCIDENT * cutoff
+    else:
+        most, closest = np.full(model.world_count, numbers.max), CLOSEST * _sizes(model)
+    return {"cutoff_squared": most, "closest_squared": np.maximum(closest**2, numbers.tiny)}
+
+
+def _sizes(model: Model) -> np.ndarray:
+    """How far the particles of each world are apart along an axis, (worlds,); 1 where nowhere."""
+    x = [scene.position for scene in model.scenes]
+    return np.array([float(np.ptp(each, axis=0).max()) or 1.0 if len(each) else 1.0 for each in x])
 
 
 def check_names(owner: str, law: Law) -> None:

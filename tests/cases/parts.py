@@ -164,12 +164,18 @@ def particles():
     return x, v, rng.uniform(0.5, 1.5, COUNT), rng.uniform(0.4, 0.6, COUNT)
 
 
-def scene(names, frame=None, order=None, changed=None):
-    """A scene of the cluster and these parts, in a frame; ``order`` permutes the particles."""
+def scene(names, frame=None, order=None, changed=None, box=None, places=None):
+    """A scene of the cluster and these parts, in a frame.
+
+    order: permutes the particles. changed: makes a part of name and frame. box: side of a periodic
+    box around the frame's origin. places: positions instead of the cluster's.
+    """
     frame = Frame() if frame is None else frame
     order = np.arange(COUNT) if order is None else order
     x, v, m, radius = particles()
-    result = ps.Scene()
+    x = x if places is None else places
+    side = None if box is None else np.full(3, 0.5 * box)
+    result = ps.Scene(periodic=None if box is None else (-side, side))
     result.add_particles(
         frame.point(x)[order], velocity=frame.velocity(v)[order],
         mass=m[order] * frame.mass, radius=radius[order] * frame.length,

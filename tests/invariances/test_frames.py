@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from cases.frames import ASKEW, MIRROR, QUARTER, Frame
+from cases.frames import ASKEW, MIRROR, QUARTER, Frame, rotation
 from cases.parts import along_axes, kinds, particles, scene
 
 STEPS, DT = 12, 0.02
@@ -56,8 +56,10 @@ def test_turned_and_mirrored(name, turn):
 
 
 @pytest.mark.parametrize("name", kinds())
-def test_elsewhere(name):
-    assert_same([name], Frame(shift=np.array([3.0, -7.0, 11.0])), 11 * ROUNDING)
+@pytest.mark.parametrize("far", [1.0, 1e6])
+def test_elsewhere(name, far):
+    """Places are rounded by what they are away from the origin."""
+    assert_same([name], Frame(shift=far * np.array([3.0, -7.0, 11.0])), 11 * far * ROUNDING)
 
 
 @pytest.mark.parametrize("name", kinds())
@@ -72,3 +74,29 @@ def test_in_motion(name):
 @pytest.mark.parametrize("power", [-3, 3])
 def test_other_units(name, unit, power):
     assert_same([name], Frame(**{unit: 10.0**power}), ROUNDING)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", kinds())
+@pytest.mark.parametrize("unit", ["length", "mass", "time"])
+@pytest.mark.parametrize("power", [-30, -24, -18, -12, -9, -6, 6, 9, 12, 18, 24, 30])
+def test_units_far_from_ones_own(name, unit, power):
+    assert_same([name], Frame(**{unit: 10.0**power}), ROUNDING)
+
+
+@pytest.mark.parametrize("name", kinds())
+def test_several_units_at_once(name):
+    """Nuclei, in metres, kilograms and seconds; and stars in a galaxy."""
+    assert_same([name], Frame(length=1e-15, mass=1e-27, time=1e-23), ROUNDING)
+    assert_same([name], Frame(length=1e20, mass=1e30, time=1e15), ROUNDING)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", kinds())
+@pytest.mark.parametrize("angle", np.linspace(0.1, 3.1, 7).round(2))
+@pytest.mark.parametrize("far", [0.0, 1e3, 1e9])
+def test_turned_elsewhere_and_in_motion(name, angle, far):
+    turn = np.eye(3) if along_axes(name) else rotation((2, -1, 1), angle)
+    boost = np.zeros(3) if name in AT_REST else np.array([-3.0, 2.0, 5.0])
+    frame = Frame(turn=turn, shift=far * np.array([1.0, -1.0, 1.0]), boost=boost)
+    assert_same([name], frame, max(far, 10.0) * ROUNDING)
