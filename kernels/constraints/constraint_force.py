@@ -86,3 +86,32 @@ def measure_kernel(law: Solved) -> wp.Kernel:
                 virial_io[i] = virial_io[i] + wp.float64(w)
 
     return constraint_measure
+
+
+@functools.cache
+def virial_kernel(law: Solved) -> wp.Kernel:
+    """Kernel: virial lam / dt^2 sum_a grad_a C . x_a of multipliers, to each particle its share."""
+    real, Box, Tuples, Bodies = law.types
+    view = view_function(law)
+
+    @register
+    def constraint_virial(
+        first: int,
+        seats: Seats,
+        box: wp.array(dtype=Box),
+        t: Tuples,
+        b: Bodies,
+        scale: wp.array(dtype=real),
+        virial_io: wp.array(dtype=wp.float64),
+    ):
+        k = first + wp.tid()
+        i = seats.particle[k]
+        for n in range(seats.begin[k], seats.begin[k + 1]):
+            r = seats.tuple[n]
+            a = seats.seat[n]
+            _x, _e, X, _C, G = view(r, box, t, b)
+            w = t.lam[r] * scale[0] * wp.dot(G[a], X[a] - X[0])
+            if wp.isfinite(w):
+                virial_io[i] = virial_io[i] + wp.float64(w)
+
+    return constraint_virial

@@ -21,6 +21,7 @@ def contact_types(precision: Precision) -> tuple[Any, Any]:
         "grip": wp.array(dtype=real),  # w times the ways that friction is split
         "way": wp.array(dtype=vec3),  # of this substep; for bounces the velocity that it began with
         "v": wp.array(dtype=vec3),  # for bounces
+        "virial": wp.array(dtype=real),  # of each particle in this substep, twice its share
         "inverse_dt_squared": real,
     }
     shares = {
@@ -164,3 +165,18 @@ def gather_bounce_kernel(precision: Precision, compensated: bool, forces: bool) 
         d_out.way[s] = v
 
     return gather_bounces
+
+
+@functools.cache
+def share_kernel(precision: Precision) -> wp.Kernel:
+    """Kernel: to each particle its half of the virial of its contacts."""
+    real = precision.scalar
+
+    @register
+    def share_virial(
+        first: int, twice: wp.array(dtype=real), virial_io: wp.array(dtype=wp.float64)
+    ):
+        i = first + wp.tid()
+        virial_io[i] = virial_io[i] + wp.float64(0.5) * wp.float64(twice[i])
+
+    return share_virial

@@ -107,13 +107,13 @@ def largest_eigenvalue(precision: Precision) -> wp.Function:
 
 
 def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Function:
-    """Term: multiplier times direction of a pair's correction.
+    """Term: multiplier times direction of a pair's correction, and times its distance.
 
     lam = (R_i + R_j - r) / (c_i w_i + c_j w_j + alpha~) along the normal, c the crowding; friction
     takes back the tangential way of the substep, split among the contacts too, with at most
-    mu lam (Macklin et al. 2014, eq. 24).
+    mu lam (Macklin et al. 2014, eq. 24), across the distance.
     """
-    vec3, real = precision.vec3, precision.scalar
+    vec3, real, four = precision.vec3, precision.scalar, precision.vector(4)
     (Data, _), (separation, both, between) = contact_types(precision), _of_pairs(precision)
 
     def push(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
@@ -140,29 +140,30 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
             split = wp.where(split > real(0.0), split, real(1.0))  # of two pinned ones: nothing
             limit = p.friction * lam / wp.where(length > real(0.0), length, real(1.0))
             result = result - t * wp.min(real(1.0) / split, limit)
-        return result
+        return four(result[0], result[1], result[2], lam * r)
 
     return function(push)
 
 
 def bounce_term(precision: Precision, params: Any) -> wp.Function:
-    """Term: impulse that sends a pair off at e times the speed it approached with.
+    """Term: impulse that sends a pair off at e times the speed it approached with, and it times r.
 
     Mueller et al. (2020), eq. 34; the speed is that before the forces of the substep, so that
     what rests under gravity does not bounce.
     """
-    vec3, real = precision.vec3, precision.scalar
+    vec3, real, four = precision.vec3, precision.scalar, precision.vector(4)
     (Data, _), (separation, both, between) = contact_types(precision), _of_pairs(precision)
 
     def bounce(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
-        _r, n = separation(i, j, x_ij, r2, p.closest_squared)
+        r, n = separation(i, j, x_ij, r2, p.closest_squared)
         reach = both(d.radius, i, j)
         share = both(d.share, i, j)
         before = wp.dot(between(d.way, i, j), n)
         missing = -p.restitution * before - wp.dot(between(d.v, i, j), n)
         touching = r2 < reach * reach and share > real(0.0)
         hit = touching and before < real(0.0) and missing > real(0.0)
-        return n * (wp.where(hit, missing, real(0.0)) / wp.where(hit, share, real(1.0)))
+        impulse = wp.where(hit, missing, real(0.0)) / wp.where(hit, share, real(1.0))
+        return four(n[0] * impulse, n[1] * impulse, n[2] * impulse, impulse * r)
 
     return function(bounce)
 
@@ -196,25 +197,29 @@ def store_share(precision: Precision, params: Any) -> wp.Function:
 
 
 def store_correction(precision: Precision, params: Any, compensated: bool) -> wp.Function:
-    """Store: x += w sum, and the same into the correction."""
-    vec3, real = precision.vec3, precision.scalar
+    """Store: x += w sum, and the same into the correction; the virial of the multipliers."""
+    vec3, real, four = precision.vec3, precision.scalar, precision.vector(4)
     (Data, _), Bodies = contact_types(precision), bodies_type(precision)
     kept, place = rounding_function(precision, compensated), place_function(precision, compensated)
 
-    def correct(i: int, particle: int, total: vec3, d: Data, p: params, o: Bodies):
+    def correct(i: int, particle: int, total: four, d: Data, p: params, o: Bodies):
         touched = total[0] != real(0.0) or total[1] != real(0.0) or total[2] != real(0.0)
         if touched:
-            place(particle, o.x[particle], kept(particle, o), total * o.w[particle], o)
+            dx = vec3(total[0], total[1], total[2]) * o.w[particle]
+            place(particle, o.x[particle], kept(particle, o), dx, o)
+            d.virial[particle] = d.virial[particle] + total[3] * d.inverse_dt_squared
 
     return function(correct)
 
 
 def store_impulse(precision: Precision, params: Any) -> wp.Function:
-    """Store: v += w sum."""
-    vec3 = precision.vec3
+    """Store: v += w sum; the virial of the impulses, over the substep."""
+    vec3, four = precision.vec3, precision.vector(4)
     (Data, _), Bodies = contact_types(precision), bodies_type(precision)
 
-    def kick(i: int, particle: int, total: vec3, d: Data, p: params, o: Bodies):
-        o.v[particle] = o.v[particle] + total * o.w[particle]
+    def kick(i: int, particle: int, total: four, d: Data, p: params, o: Bodies):
+        impulse = vec3(total[0], total[1], total[2])
+        o.v[particle] = o.v[particle] + impulse * o.w[particle]
+        d.virial[particle] = d.virial[particle] + total[3] * wp.sqrt(d.inverse_dt_squared)
 
     return function(kick)

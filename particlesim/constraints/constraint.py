@@ -18,6 +18,7 @@ from ..engine.neighbors.lists import Neighbors
 from ..engine.probe import Probe
 from ..engine.state import State
 from ..kernels.constraints import constraints as kernels
+from ..kernels.constraints.constraint_force import virial_kernel
 from ..scene.law import law as make_law
 from ..scene.part import ConstraintBase, Part
 from .force import ConstraintForce
@@ -217,6 +218,15 @@ class Constraint(ConstraintBase):
             int(may_break), self.model.box, self.struct, self.bodies, self.scale, self.strain,
         ]  # fmt: skip
         launch(self.strain_kernel, self.count, inputs, self.model.device)
+
+    def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
+        """Add the virial of the multipliers of the last substep."""
+        if not self.count:
+            return
+        seats = self.tuples.seats()
+        kernel = virial_kernel(self.tuples.solved(self, state))
+        inputs = [seats, self.model.box, self.struct, self.bodies, self.scale, virial]
+        launch(kernel, len(seats.particle), inputs, self.model.device)
 
     def limits(self, probe: Probe) -> list[Limit]:
         """None, as XPBD is implicit; how fast it damps is told."""

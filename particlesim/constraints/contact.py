@@ -18,6 +18,7 @@ from ..engine.state import State
 from ..kernels.constraints import contact as kernels
 from ..kernels.constraints import contact_terms as terms
 from ..kernels.constraints.constraints import bodies_type
+from ..kernels.engine.copy import zero_kernel
 from ..kernels.interactions.pair import pair_kernel
 from .easing import EasedConstraint, Easing
 from .limits import contact_limits
@@ -138,6 +139,7 @@ class Contact(EasedConstraint):
         if self.bouncing:
             self.copies["v"] = self.pairs.array(precision.vec3)
         self.Data = Data
+        self.virial = wp.zeros(model.particle_count, dtype=precision.scalar, device=model.device)
         self.shares, self.bounce_shares = Shares(), Shares()
         for shares, relaxation in (
             (self.shares, model.settings.relaxation), (self.bounce_shares, 1.0)
@@ -169,7 +171,7 @@ class Contact(EasedConstraint):
         )
         self.bounce_kernel = self._kernel(
             terms.bounce_term(precision, self._Params), terms.store_impulse,
-            bodies_type(precision), 3,
+            bodies_type(precision), 4,
         )  # fmt: skip
 
     @property
@@ -188,7 +190,7 @@ class Contact(EasedConstraint):
         return self._kernel(
             terms.contact_term(precision, self._Params, friction),
             lambda *types: terms.store_correction(*types, self.compensated),
-            bodies_type(precision), 3,
+            bodies_type(precision), 4,
         )  # fmt: skip
 
     def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
@@ -197,6 +199,8 @@ class Contact(EasedConstraint):
         if not self.count or math.isinf(dt) or dt <= 0:
             return
         model, pairs = self.model, self.pairs.pairs
+        zero = zero_kernel(self.virial.dtype)
+        launch(zero, model.particle_count, [self.virial], model.device)
         measure, run_out = kernels.slack_kernels(model.precision, model.periodic)
         slack = self.easing.slack
         with when(self.easing.any_marked):
@@ -215,7 +219,7 @@ class Contact(EasedConstraint):
         data = self.Data()
         for name, array in self.copies.items():
             setattr(data, name, array)
-        data.inverse_dt_squared = 1.0 / dt**2
+        data.virial, data.inverse_dt_squared = self.virial, 1.0 / dt**2
         return data
 
     def _sum(self, kernel: wp.Kernel, params: wp.array, data: Any, out: Any) -> None:
@@ -255,6 +259,15 @@ class Contact(EasedConstraint):
         )  # fmt: skip
         self._sum(self.count_bounces, self.bounces[1], data, self.bounce_shares)
         self._sum(self.bounce_kernel, self.bounces[1], data, self.bodies)
+
+    def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
+        """Add the virial of the last substep's contacts."""
+        if self.count:
+            share = kernels.share_kernel(self.model.precision)
+            launch(share, len(virial), [self.virial, virial], self.model.device)
+
+    def readable(self) -> dict[str, wp.array]:
+        return {"virial": self.virial} if self.count else {}
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the speed of the particles against their radius."""

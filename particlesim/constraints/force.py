@@ -65,8 +65,8 @@ class ConstraintForce(Interaction):
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
         self.tuples = Tuples(self.name, model, [peer.constraint for peer in self.peers])
-        self.rows = self.tuples.seats()
-        self.count = len(self.rows["particle"])
+        self.seats = self.tuples.seats()
+        self.count = len(self.seats.particle)
 
     def attach(self, model: Model, state: State) -> None:
         if not self.count:
@@ -74,9 +74,6 @@ class ConstraintForce(Interaction):
         constraint, tuples = self.constraint, self.tuples
         self.struct = tuples.struct(inequality=constraint.inequality, breakable=False)
         self.bodies = bodies(model, state)
-        self.seats = kernels.Seats()
-        for name, column in self.rows.items():
-            setattr(self.seats, name, model.array(column.astype(np.int32), wp.int32))
         solved = tuples.solved(constraint, state)
         self.force_kernel = kernels.force_kernel(solved)
         self.measure_kernel = kernels.measure_kernel(solved)

@@ -11,6 +11,7 @@ import warp as wp
 from ..engine import topology
 from ..engine.model import Model
 from ..engine.state import State
+from ..kernels.constraints.constraint_force import Seats
 from ..kernels.constraints.constraints import Solved, bodies_type, tuples_type
 
 
@@ -63,17 +64,21 @@ class Tuples:
             "position_error" in state, self.size, self.Item, constraint.relative, constraint.unit,
         )  # fmt: skip
 
-    def seats(self) -> dict[str, np.ndarray]:
-        """The tuples of every particle that is in one (see kernels.constraint_force)."""
+    def seats(self) -> Seats:
+        """The tuples of every particle that is in one."""
         ends = self.particles.reshape(-1)
         order = np.argsort(ends, kind="stable")
         particle, begin = np.unique(ends[order], return_index=True)
-        return {
+        columns = {
             "particle": particle,
             "begin": np.append(begin, len(ends)),
             "tuple": order // self.size,
             "seat": order % self.size,
         }
+        result = Seats()
+        for name, column in columns.items():
+            setattr(result, name, self.model.array(column.astype(np.int32), wp.int32))
+        return result
 
 
 def bodies(model: Model, state: State) -> Any:

@@ -25,7 +25,8 @@ class Diagnostics(Report):
 
     mass (worlds,), momentum (worlds, 3) and angular_momentum about the origin (worlds, 3);
     kinetic and potential energy, their sum ``energy``, and the virial sum of r.F over pairs,
-    (worlds,). Pinned particles count in the mass and the potential energy only.
+    (worlds,), to which constraints between particles and contacts add that of the last substep.
+    Pinned particles count in the mass and the potential energy only.
     """
 
     mass: np.ndarray
@@ -67,6 +68,8 @@ def measure(sim: Source, potentials: list[np.ndarray] | None = None) -> Diagnost
     with undisturbed(sim):
         sim.neighbors.update(state)
         sim.neighbors.grow()
+        for constraint in sim.constraints:
+            constraint.measure(state, energy, virial)
         for interaction in sim.interactions:
             before = energy.numpy().copy() if potentials is not None else None
             interaction.measure(state, energy, virial)

@@ -217,6 +217,9 @@ class ConstraintBase(Part):
     def finish(self, state: Any, neighbors: Any, dt: float) -> None:
         """After the velocities have followed: restitution, breaking."""
 
+    def measure(self, state: Any, energy: Any, virial: Any) -> None:
+        """Add the virial of each particle (float64) in the last substep, on demand."""
+
     def read_force(self, part: Part) -> np.ndarray:
         """See ``Simulation.force``; ``part`` is this, or the one of some worlds' scenes."""
         raise self._unknown("force")
