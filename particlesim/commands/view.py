@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from .. import validate
-from ..output.interrupts import Terminated
+from ..output.interrupts import Terminated, heard
 from .shell import (
     USD,
     Color,
@@ -84,6 +84,7 @@ def _show(
     if validate.whole(OWNER, "port", port) > PORTS:
         raise validate.fail(OWNER, "port", f"be at most {PORTS}", port, "choose a smaller one")
     with contextlib.ExitStack() as stack:
+        stack.callback(heard)
         stack.enter_context(contextlib.suppress(KeyboardInterrupt, Terminated))
         source = _source(name, color, simulate)
         if isinstance(source, Live):

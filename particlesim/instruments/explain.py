@@ -8,19 +8,22 @@ from dataclasses import dataclass
 from ..engine.execution.launch import Launch, When
 from ..engine.frames import Frames
 from ..engine.report import Report
+from ..scene.scene import ARGUMENTS
 
 
 @dataclass(frozen=True, repr=False)
 class Explanation(Report):
     """What one substep takes. ``str()`` makes the report.
 
-    arrays: bytes per particle of each array of the state. lists: one line for each pair list.
+    arrays: bytes per particle of each array of the state. unread: attributes of the particles that
+    no part reads, and so have none. lists: one line for each pair list.
     launches: (owner, kernel, rows) of each launch of a substep; ``conditional`` ones run only
     when neighbour lists are rebuilt.
     """
 
     title: str
     arrays: dict[str, float]
+    unread: list[str]
     lists: list[str]
     launches: list[tuple[str, str, int]]
     conditional: list[tuple[str, str, int]]
@@ -40,6 +43,8 @@ class Explanation(Report):
     def __str__(self) -> str:
         lines = [self.title, "", f"arrays ({self.bytes_per_particle:.0f} bytes per particle)"]
         lines += [f"  {name:<20} {size:6.1f} B" for name, size in self.arrays.items()]
+        if self.unread:
+            lines += [f"  of no part's: {', '.join(self.unread)}"]
         lines += ["", "pair lists", *([f"  {line}" for line in self.lists] or ["  none"])]
         for heading, launches in (
             (f"a substep: {len(self.launches)} launches", self.launches),
@@ -89,6 +94,7 @@ def explain(frames: Frames) -> Explanation:
             f"of {loop.settings.substep:g}"
         ),
         arrays=arrays,
+        unread=[name for name in model.attributes if name not in {*ARGUMENTS, *loop.state.arrays}],
         lists=[each.describe() for each in loop.neighbors.lists],
         launches=always,
         conditional=sometimes,

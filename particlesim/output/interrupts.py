@@ -24,17 +24,44 @@ def terminate(number: int = signal.SIGTERM, frame: FrameType | None = None) -> N
     raise Terminated
 
 
+_asked: int | None = None  # the signal that asked for an end, of who may not have heard it
+
+
+def _ask(number: int, frame: FrameType | None) -> None:
+    """The handler of both signals in a program of ours."""
+    global _asked
+    _asked = number
+    handler = terminate if number == signal.SIGTERM else signal.default_int_handler
+    handler(number, frame)
+
+
+def heard() -> None:
+    """Who caught what was raised ends as it should."""
+    global _asked
+    _asked = None
+
+
 @contextlib.contextmanager
 def terminable() -> Iterator[None]:
-    """Let SIGTERM raise :class:`Terminated`, unless the program has a handler of its own."""
-    ours = _in_main_thread() and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-    if ours:
-        signal.signal(signal.SIGTERM, terminate)
+    """Let SIGTERM raise :class:`Terminated`, unless the program has a handler of its own.
+
+    A library that is being loaded may swallow that, and a KeyboardInterrupt as well. Then it comes
+    once more, at the next :meth:`Deferred.check` or at the end.
+    """
+    usual: dict[int, Any] = {
+        signal.SIGTERM: signal.SIG_DFL, signal.SIGINT: signal.default_int_handler,
+    }  # fmt: skip
+    ours = [number for number in SIGNALS if signal.getsignal(number) is usual[number]]
+    for number in ours if _in_main_thread() else ():
+        signal.signal(number, _ask)
     try:
         yield
+        if _asked is not None:
+            _ask(_asked, None)
     finally:
-        if ours:
-            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        for number in ours if _in_main_thread() else ():
+            signal.signal(number, usual[number])
+        heard()
 
 
 class Deferred:
@@ -52,11 +79,13 @@ class Deferred:
         self._ending = False
 
     def check(self) -> None:
-        """Let what was kept come.
+        """Let what was kept come, or what was swallowed.
 
         Raises:
             KeyboardInterrupt, Terminated: An end was asked for.
         """
+        if self._kept is None and self._before:
+            self._kept = _asked
         if self._kept is not None:
             number, self._kept = self._kept, None
             self._ending = self.acted = True

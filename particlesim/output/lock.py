@@ -67,17 +67,21 @@ class Lock(files.Closing):
         _remove_unfinished(path)
 
     def reserve(self, size: int) -> None:
-        """Hold room on the disk for what comes at the end, until :meth:`free`, where that can be.
+        """Hold room on the disk for what comes at the end, until :meth:`free`.
 
         Raises:
             OSError: There is none.
         """
-        if size <= self._reserved or not hasattr(os, "posix_fallocate"):
+        if size <= self._reserved:
             return
         room = 2 * size + SPARE  # it may grow: not every time
         try:
             with open(self.path, "r+b") as file:
-                os.posix_fallocate(file.fileno(), SHOWN, room)
+                if hasattr(os, "posix_fallocate"):
+                    os.posix_fallocate(file.fileno(), SHOWN, room)
+                else:  # macOS and Windows; a file that is only made longer may hold no room
+                    file.seek(SHOWN)
+                    file.write(bytes(room))
         except OSError as error:
             kept = "What was written before is kept."
             raise files.unwritable(self.owner, self.output, error, kept) from error

@@ -94,9 +94,11 @@ def test_only_attributes_that_a_law_names_are_on_the_device(device):
         return charge_i * charge_j / r
 
     scene = scene_with(ps.PairPotential(coulomb, cutoff=1.5), charge=1.0, spin=[(0, 0, 1)] * 8)
-    sim, _ = explained(scene, device)
+    sim, found = explained(scene, device)
     assert "charge" in sim.state
     assert "spin" not in sim.state
+    assert found.unread == ["spin"]
+    assert "of no part's: spin\n" in str(found)
 
 
 def test_time_is_kept_only_for_laws_that_ask(device):

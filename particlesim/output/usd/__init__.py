@@ -10,4 +10,5 @@ from ..interrupts import Deferred
 
 # USD swallows what a handler of signals raises while its libraries are being loaded.
 with Deferred():
-    importlib.import_module("pxr.UsdGeom")
+    for name in ("UsdGeom", "UsdUtils"):
+        importlib.import_module(f"pxr.{name}")
