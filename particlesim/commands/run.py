@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from ..output import files
+from ..output.interrupts import Deferred
 from ..output.progress import announced, label
 from .scene_files import ready_scenes
 from .shell import (
@@ -242,7 +243,8 @@ def _check_places(out: Path | None, history: Path | None, may_exist: bool) -> No
         check_new("run", history, may_exist, suffixes=SUFFIXES, argument="--history")
     for option, path in (("--out", out), ("--history", history)):
         if path is not None:
-            Lock("run", path, option).close()
+            with Deferred():  # or who is ended here would leave it
+                Lock("run", path, option).close()
 
 
 def _check_output(out: Path | None, overwrite: bool, resume: bool) -> None:

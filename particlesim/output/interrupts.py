@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
@@ -17,6 +18,9 @@ class Terminated(SystemExit):
 
     def __init__(self) -> None:
         super().__init__(128 + signal.SIGTERM)
+
+
+ENDS = (KeyboardInterrupt, Terminated)
 
 
 def terminate(number: int = signal.SIGTERM, frame: FrameType | None = None) -> NoReturn:
@@ -45,15 +49,18 @@ def heard() -> None:
 def terminable() -> Iterator[None]:
     """Let SIGTERM raise :class:`Terminated`, unless the program has a handler of its own.
 
-    A library that is being loaded may swallow that, and a KeyboardInterrupt as well. Then it comes
-    once more, at the next :meth:`Deferred.check` or at the end.
+    A library that is being loaded may swallow that, and a KeyboardInterrupt as well, and Python
+    does in what it calls on its own, as finalizers. Then it comes once more, at the next
+    :meth:`Deferred.check` or at the end.
     """
+    hook = sys.unraisablehook
     usual: dict[int, Any] = {
         signal.SIGTERM: signal.SIG_DFL, signal.SIGINT: signal.default_int_handler,
     }  # fmt: skip
     ours = [number for number in SIGNALS if signal.getsignal(number) is usual[number]]
     for number in ours if _in_main_thread() else ():
         signal.signal(number, _ask)
+    sys.unraisablehook = lambda told: None if isinstance(told.exc_value, ENDS) else hook(told)
     try:
         yield
         if _asked is not None:
@@ -61,6 +68,7 @@ def terminable() -> Iterator[None]:
     finally:
         for number in ours if _in_main_thread() else ():
             signal.signal(number, usual[number])
+        sys.unraisablehook = hook
         heard()
 
 

@@ -35,13 +35,14 @@ def run(
         files.check_new("History", history, overwrite or resume, suffixes=SUFFIXES)
     with contextlib.ExitStack() as stack:
         recording = measured = None
+        # Around the locks: none is left behind by who is ended between taking and holding it.
+        interrupts = stack.enter_context(Deferred())
         locks: dict[Path, Lock] = {}
         for argument, path in (("record", record), ("history", history)):
             if path is not None and lock_path(Path(path)) not in locks:
                 lock = stack.enter_context(Lock(OWNER, Path(path), argument))
                 locks[lock.path] = lock
         if record is not None:
-            interrupts = stack.enter_context(Deferred())
             options = {"overwrite": overwrite, "resume": resume, **options}
             lock = locks[lock_path(Path(record))]
             # First of all: a run that is resumed moves on to its checkpoint.
@@ -64,8 +65,7 @@ def run(
                 measured.write()
             if callable(progress):
                 progress(sim.frame - first, frames)
-            if recording is not None:
-                recording.interrupts.check()
+            interrupts.check()
 
 
 class Recording:
