@@ -5,7 +5,6 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,10 +12,10 @@ import numpy as np
 import typer
 
 from .. import validate
-from ..output import files
 from ..output.progress import Meter
 from ..pictures.render import film, image
-from ..pictures.render.camera import FIELD_OF_VIEW, Camera
+from ..pictures.render.camera import Camera
+from .request import OWNER, Request, chosen_frames, parse_numbers
 from .shell import (
     USD,
     Color,
@@ -28,9 +27,6 @@ from .shell import (
     opened,
     simulation,
 )
-
-OWNER = "render"
-ENGINES = ("warp", "cycles")
 
 File = Annotated[str, typer.Argument(metavar="FILE", help="A recording, any USD file, or a scene.")]
 Out = Annotated[Path, typer.Option(help="Picture, .png, .jpg, .webp; or film, .gif, .mp4.")]
@@ -47,6 +43,7 @@ Viewpoint = Annotated[
         help="Position, target, and angle of view [degrees]. Default: the file's own.",
     ),
 ]
+Follow = Annotated[bool, typer.Option("--follow", help="A film's camera goes with the particles.")]
 ColorMap = Annotated[str, typer.Option(help="viridis, magma, cubehelix, coolwarm or gray.")]
 ColorRange = Annotated[
     str | None, typer.Option(metavar="LOW,HIGH", help="Values with the first and last colour.")
@@ -69,6 +66,7 @@ def render(
     frame: Frame = None,
     frames: Frames = None,
     camera: Viewpoint = None,
+    follow: Follow = False,
     color: Color = None,
     color_map: ColorMap = "viridis",
     color_range: ColorRange = None,
@@ -87,8 +85,8 @@ def render(
     """Draw a picture or a film of a recording, or a picture of a scene."""
     with opened(debug) as meter, tempfile.TemporaryDirectory(prefix="particlesim-") as folder:
         request = Request(
-            out, frame, frames, camera, color, color_map, color_range, width, height, ground, fps,
-            engine, samples, python, device, overwrite,
+            out, frame, frames, camera, follow, color, color_map, color_range, width, height,
+            ground, fps, engine, samples, python, device, overwrite,
         )  # fmt: skip
         path = Path(file)
         if path.suffix.lower() in USD:
@@ -104,79 +102,6 @@ def render(
             path = Path(folder) / "frame.usda"
             _record(simulation(load(file, debug), options, device, None), request, path)
         typer.echo(_draw(path, file, request, meter))
-
-
-@dataclass(frozen=True)
-class Request:
-    """What the command line asks for; see its help."""
-
-    out: Path
-    frame: int | None = None
-    frames: str | None = None
-    camera: str | None = None
-    color: str | None = None
-    color_map: str = "viridis"
-    color_range: str | None = None
-    width: int = 1280
-    height: int = 720
-    ground: bool | None = None
-    fps: float | None = None
-    engine: str = "warp"
-    samples: int = 64
-    python: str | None = None
-    device: str | None = None
-    overwrite: bool = False
-
-    def __post_init__(self) -> None:
-        validate.choice(OWNER, "engine", self.engine, ENGINES)
-        formats = (*image.FORMATS, *film.FORMATS)
-        files.check_new(
-            OWNER, self.out, self.overwrite, suffixes=formats, consent="give --overwrite"
-        )
-        if not self.is_film and self.frames is not None:
-            raise validate.fail(
-                OWNER, "--frames", "be of a film, .gif or .mp4", str(self.out),
-                "give --frame for one picture",
-            )  # fmt: skip
-        if self.is_film and self.frame is not None:
-            raise validate.fail(
-                OWNER, "--frame", "be of one picture", str(self.out), "give --frames a:b for a film"
-            )
-        # What is missing is better known before the work.
-        if self.out.suffix.lower() == ".mp4":
-            film.ffmpeg()
-        else:
-            image.pillow()
-
-    @property
-    def is_film(self) -> bool:
-        """Whether many pictures are asked for."""
-        return self.out.suffix.lower() in film.FORMATS
-
-    def viewpoint(self, recording: Any, frames: list[float], view: Any) -> Camera:
-        """The camera: the one asked for, or the file's own, or one that sees all frames.
-
-        The own one of a recording gives way in films whose particles leave its picture.
-
-        Args:
-            recording: An open recording.
-            frames: Time codes of the pictures.
-            view: What there is to see in the first of them.
-        """
-        if self.camera is None:
-            from ..output.usd.recording import notes
-            from ..pictures.render.stage import overlook
-
-            # The camera that a recorder put there knew the first frame only.
-            fixed = view.camera is not None and not (self.is_film and notes(recording.stage))
-            return (
-                view.camera
-                if fixed
-                else overlook(recording, frames, self.width / self.height, view.camera)
-            )
-        numbers = parse_numbers("--camera", self.camera, (6, 7), "px,py,pz,tx,ty,tz[,angle]")
-        angle = numbers[6] if len(numbers) == 7 else FIELD_OF_VIEW
-        return Camera(numbers[:3], numbers[3:6], view.up, angle)
 
 
 def _record(sim: Any, request: Request, path: Path) -> None:
@@ -196,7 +121,7 @@ def _draw(path: Path, name: str, request: Request, meter: Meter) -> str:
 
     recording = Recording(OWNER, path)
     stage, there = recording.stage, recording.frames() or [0.0]
-    frames = _chosen(request, there)
+    frames = chosen_frames(request, there)
     paint = Paint()
     if request.color is not None:
         check_field(stage, request.color)
@@ -238,14 +163,15 @@ def _pictures(
 
     renderer = Renderer(request.device)
     stack.callback(renderer.close)
-    camera = None
+    cameras: list[Camera] = []
     for number, frame in enumerate(frames):
         if number and number % PORTION == 0:  # a stage keeps all clips open that it has read
             recording = Recording(OWNER, recording.path)
         view = look_at(recording.stage, frame, paint)
         look = Look(up=view.up, ground=ground_height(view, request.ground))
-        camera = camera or request.viewpoint(recording, frames, view)
-        yield renderer.draw(view.geometry, camera, request.width, request.height, look).array
+        cameras = cameras or request.viewpoints(recording, frames, view)
+        size = request.width, request.height
+        yield renderer.draw(view.geometry, cameras[number], *size, look).array
 
 
 def _counted(pictures: Iterable[np.ndarray], count: int, meter: Meter) -> Iterator[np.ndarray]:
@@ -254,46 +180,3 @@ def _counted(pictures: Iterable[np.ndarray], count: int, meter: Meter) -> Iterat
         for done, picture in enumerate(pictures, start=1):
             yield picture
             show(done, count, "drawing")
-
-
-def _chosen(request: Request, there: list[float]) -> list[float]:
-    """The frames asked for, of those that are there; of a picture the last."""
-    if not request.is_film:
-        if request.frame is None or len(there) == 1:
-            return there[-1:]
-        if request.frame not in there:
-            raise validate.fail(
-                OWNER, "--frame", f"be from {there[0]:g} to {there[-1]:g}", request.frame,
-                "choose one that is there",
-            )  # fmt: skip
-        return [float(request.frame)]
-    if request.frames is None:
-        return there
-    words = request.frames.split(":")
-    try:
-        first, last, step = ([int(w) if w else None for w in words] + [None] * 2)[:3]
-        if len(words) not in (2, 3) or (step is not None and step < 1):
-            raise ValueError
-    except ValueError:
-        raise validate.fail(
-            OWNER, "--frames", "be first:last or first:last:step", request.frames, "as 0:120"
-        ) from None
-    low, high = first or 0, there[-1] if last is None else last
-    frames = [f for f in there if (first is None or f >= low) and f <= high][:: step or 1]
-    if not frames:
-        raise validate.fail(
-            OWNER, "--frames", f"hold some of {there[0]:g} to {there[-1]:g}", request.frames,
-            "choose some that are there",
-        )  # fmt: skip
-    return frames
-
-
-def parse_numbers(option: str, text: str, counts: tuple[int, ...], form: str) -> list[float]:
-    """Numbers with commas between them, as many as one of ``counts``."""
-    try:
-        numbers = [float(word) for word in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) not in counts or not np.isfinite(numbers).all():
-        raise validate.fail(OWNER, option, f"be {form}", text, "give numbers with commas between")
-    return numbers

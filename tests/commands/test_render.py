@@ -122,6 +122,7 @@ def test_a_scene_is_drawn_as_it_starts(render):
         ("a.png", ("--frame", "9"), "from 0 to 4, got 9"),
         ("a.png", ("--frames", "0:2"), "of a film"),
         ("a.gif", ("--frame", "1"), "of one picture"),
+        ("a.png", ("--follow",), "--follow must be of a film"),
         ("a.gif", ("--frames", "7:9"), "some of 0 to 4"),
         ("a.gif", ("--frames", "1-3"), "first:last"),
         ("a.gif", ("--frames", "1:3:0"), "first:last"),

@@ -171,7 +171,7 @@ def _camera(bpy: Any, job: dict[str, Any]) -> None:
     data.sensor_fit, data.angle = "VERTICAL", math.radians(job["angle"])
     data.clip_start, data.clip_end = 1e-4 * job["size"], 1e3 * job["size"]
     right, up, back = (turned(job, axis) for axis in job["axes"])
-    at = turned(job, job["position"])
+    at = turned(job, job["positions"][0])
     rows = [[right[k], up[k], back[k], at[k]] for k in range(3)]
     camera = bpy.data.objects.new("view", data)
     camera.matrix_world = Matrix([*rows, [0.0, 0.0, 0.0, 1.0]])
@@ -191,6 +191,7 @@ def _render(bpy: Any, job: dict[str, Any]) -> None:
     scene.view_settings.view_transform = "Standard"
     for number, frame in enumerate(job["frames"]):
         scene.frame_set(int(frame), subframe=frame - int(frame))
+        scene.camera.location = turned(job, job["positions"][number])
         scene.render.filepath = str(Path(job["folder"]) / f"picture.{number:06d}.png")
         bpy.ops.render.render(write_still=True)
         print(f"\n{DONE}{scene.render.filepath}", flush=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -72,6 +72,10 @@ class Camera:
     def slope(self) -> float:
         """Half the height of the picture at distance 1."""
         return math.tan(math.radians(0.5 * self.field_of_view))
+
+    def moved(self, way: Any) -> Camera:
+        """The same somewhere else, by (3,) [length]."""
+        return replace(self, position=self.position + way, target=self.target + way)
 
     @classmethod
     def around(cls, points: Any, up: Any, aspect: float, radius: Any = 0.0) -> Camera:

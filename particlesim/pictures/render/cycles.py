@@ -75,7 +75,8 @@ def _job(
 ) -> dict[str, Any]:
     """What the other process needs to know, as plain values; directions in the stage's space."""
     view = look_at(recording.stage, frames[0], paint)
-    camera = request.viewpoint(recording, frames, view)
+    cameras = request.viewpoints(recording, frames, view)
+    camera = cameras[0]
     look = looks.Look(up=view.up)
     ramp = None
     if paint.color_by is not None:
@@ -89,7 +90,7 @@ def _job(
         "height": request.height,
         "samples": request.samples,
         "z_up": UsdGeom.GetStageUpAxis(recording.stage) == UsdGeom.Tokens.z,
-        "position": camera.position.tolist(),
+        "positions": [each.position.tolist() for each in cameras],
         "axes": camera.axes.tolist(),
         "angle": camera.field_of_view,
         "key": look.key_direction(camera.axes).tolist(),

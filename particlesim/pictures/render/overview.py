@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from .camera import Camera, Framing
 from .geometry import SHAPES, Geometry
 
@@ -30,9 +32,18 @@ class Overview:
     def add(self, geometry: Geometry) -> None:
         """What there is to see in one more frame."""
         self.all.add(*geometry.points())
-        particles, radius = geometry.points("ball")
-        self.most.add(particles, radius, MOST if len(particles) > MANY else 1.0)
+        self._add_particles(self.most, geometry, np.zeros(3))
         self.most.add(*geometry.points(*(name for name in SHAPES if name != "ball")))
+
+    def add_around(self, geometry: Geometry, middle: np.ndarray) -> None:
+        """The particles of one more frame, seen from their middle (see :func:`middle`)."""
+        points, radius = geometry.points(*_moving(geometry))
+        self.all.add(points - middle, radius)
+        self._add_particles(self.most, geometry, middle)
+
+    def _add_particles(self, framing: Framing, geometry: Geometry, middle: np.ndarray) -> None:
+        particles, radius = geometry.points("ball")
+        framing.add(particles - middle, radius, MOST if len(particles) > MANY else 1.0)
 
     def camera(self) -> Camera:
         """The camera; of nothing, one that sees the origin."""
@@ -44,6 +55,17 @@ class Overview:
         particles, radius = geometry.points("ball")
         share = MOST if len(particles) > MANY else 1.0
         return camera.sees(particles, radius, self.aspect, share)
+
+
+def middle(geometry: Geometry) -> np.ndarray:
+    """The mean of the particles' places, or of all points where there are none, (3,)."""
+    points = geometry.points(*_moving(geometry))[0]
+    return points.mean(axis=0, dtype=np.float64) if len(points) else np.zeros(3)
+
+
+def _moving(geometry: Geometry) -> list[str]:
+    """What a camera follows."""
+    return ["ball"] if len(geometry.array("ball")) else list(SHAPES)
 
 
 def overview(geometry: Geometry, up: Any, aspect: float) -> Camera:

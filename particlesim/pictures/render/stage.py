@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from ...output.usd.recording import PORTION, Recording, prims, up_axis
 from ...output.usd.writing.geometry import posed
 from .camera import Camera
 from .geometry import Geometry
-from .overview import Overview
+from .overview import Overview, middle
 from .paint import Paint
 from .prims import PrimReader
 
@@ -78,13 +78,33 @@ def overlook(
 ) -> Camera:
     """The camera of some frames: the own one if that sees the particles in each, or an overview."""
     framed = Overview(up_axis(recording.stage), aspect)
-    for number, frame in enumerate(frames):
-        if number and number % PORTION == 0:  # a stage keeps all clips open that it has read
-            recording = Recording("render", recording.path)
-        geometry = look_at(recording.stage, frame).geometry
+    for geometry in _geometries(recording, frames):
         framed.add(geometry)
         own = own if own is not None and framed.seen_by(own, geometry) else None
     return own or framed.camera()
+
+
+def follow(
+    recording: Recording, frames: Sequence[float], aspect: float, own: Camera | None
+) -> list[Camera]:
+    """A camera for each frame, which goes with the middle of the particles and does not turn.
+
+    The first is the own one; or else all are as near as lets them see the particles in each.
+    """
+    framed = Overview(up_axis(recording.stage), aspect)
+    middles = []
+    for geometry in _geometries(recording, frames):
+        middles.append(middle(geometry))
+        framed.add_around(geometry, middles[-1])
+    camera = framed.camera().moved(middles[0]) if own is None else own
+    return [camera.moved(each - middles[0]) for each in middles]
+
+
+def _geometries(recording: Recording, frames: Sequence[float]) -> Iterator[Geometry]:
+    for number, frame in enumerate(frames):
+        if number and number % PORTION == 0:  # a stage keeps all clips open that it has read
+            recording = Recording("render", recording.path)
+        yield look_at(recording.stage, frame).geometry
 
 
 def _hidden(image: UsdGeom.Imageable, time: Usd.TimeCode) -> bool:

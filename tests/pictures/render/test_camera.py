@@ -8,7 +8,7 @@ from particlesim.output.usd.recording import Recording
 from particlesim.pictures.render.camera import ROOM, Framing
 from particlesim.pictures.render.geometry import Geometry
 from particlesim.pictures.render.overview import overview
-from particlesim.pictures.render.stage import look_at, overlook
+from particlesim.pictures.render.stage import follow, look_at, overlook
 
 ASPECT = 16 / 9
 
@@ -143,3 +143,30 @@ def test_a_film_sees_all_of_its_frames(tmp_path, speed):
     assert (camera is own) == (speed == 0.0)
     for x in (start, sim.position):
         assert outside(camera, x, 0.1, room=1.0) < 1e-6
+
+
+def test_a_camera_that_follows(tmp_path):
+    """It sees all particles in every frame from as near as their own size asks, and never turns."""
+    scene = ps.Scene()
+    start = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], dtype=float)
+    scene.add_particles(start, velocity=(50, 20, -30) + 0.5 * (start - 0.5), radius=0.1)
+    scene.add_constraint(ps.PlaneBoundary((0, -100, 0), (0, 1, 0)))
+    path = tmp_path / "out.usda"
+    sim, places = ps.Simulation(scene, ps.Settings(dt=0.1), device="cpu"), [start]
+    sim.run(10, record=path, progress=lambda *_: places.append(sim.position))
+    recording = Recording("render", path)
+    cameras = follow(recording, recording.frames(), ASPECT, None)
+    assert len(cameras) == 11
+    for camera, x in zip(cameras, places, strict=True):
+        assert outside(camera, x, 0.1, room=1.0) < 1e-5
+        np.testing.assert_allclose(camera.axes, cameras[0].axes, atol=1e-12)
+        way = camera.position - cameras[0].position
+        np.testing.assert_allclose(way, x.mean(axis=0) - start.mean(axis=0), atol=1e-4)
+    far = overlook(recording, recording.frames(), ASPECT, None)
+    near = np.linalg.norm(cameras[0].position - places[-1].mean(axis=0)) > 50  # where it was
+    distance = np.linalg.norm(cameras[-1].position - places[-1].mean(axis=0))
+    assert near and distance < 0.15 * np.linalg.norm(far.position - places[-1].mean(axis=0))
+    own = ps.Camera((0, 0, 9), (0, 0, 0))
+    asked = follow(recording, recording.frames(), ASPECT, own)
+    np.testing.assert_array_equal(asked[0].position, own.position)
+    np.testing.assert_allclose(asked[-1].position - own.position, way, atol=1e-12)
