@@ -4,6 +4,7 @@ import textwrap
 
 import pytest
 
+import particlesim as ps
 from particlesim import cli
 
 SCENE = '''
@@ -70,6 +71,8 @@ class Engine:
 
 @pytest.fixture
 def engine(monkeypatch):
+    for name in ps.__all__:
+        getattr(ps, name)  # what is first imported under the patch would keep the stand-in
     monkeypatch.setattr("particlesim.simulation.simulation.Simulation", Engine)
     monkeypatch.setattr(Engine, "failure", None)
     monkeypatch.setattr(Engine, "last", None)
