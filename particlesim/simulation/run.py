@@ -55,6 +55,8 @@ def run(
                 History(sim, history, overwrite=overwrite, resume=resume)
             )
             measured.write()
+            if recording is not None:
+                recording.beside = measured
         if progress is True:
             progress = stack.enter_context(Meter().measure("run", sim, frames))
         while sim.frame < first + frames:
@@ -95,6 +97,7 @@ class Recording:
         first, end = sim.frame, sim.frame + frames
         self.checkpoints = None
         self.recorded: int | None = None
+        self.beside: History | None = None  # what else has to be there for a checkpoint
         if checkpoint != 0:
             self.checkpoints = Checkpoints(sim, path, checkpoint, options)
             if resume:
@@ -132,7 +135,13 @@ class Recording:
 
     def _checkpoint(self) -> Callable[[], None]:
         assert self.checkpoints is not None
-        return self.checkpoints.capture(self.recorded, self.recorder.sync)
+        return self.checkpoints.capture(self.recorded, self._sync)
+
+    def _sync(self) -> None:
+        """Return only when the disk has what a checkpoint claims."""
+        self.recorder.sync()
+        if self.beside is not None:
+            self.beside.sync()
 
     def close(self) -> None:
         """Write what has been captured, the end of the output, and the state to go on from."""

@@ -96,6 +96,10 @@ class History(files.Closing):
         ]
         self._append("".join(lines).encode())
 
+    def sync(self) -> None:
+        """Return only when the disk has every line, so that it outlives a loss of power."""
+        files.sync([self.path])
+
     def close(self) -> None:
         """Close the file. May be called again."""
         if self._file is not None:
