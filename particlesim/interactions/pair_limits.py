@@ -21,6 +21,8 @@ LARGEST = 1e60  # of forces: squares of what comes of them stay finite
 COUPLES = 32  # of particles whose attributes the law is asked with
 GAIN = 1e-3  # of its energy that a collision may gain on average
 TRIALS, FINER, PHASES = 32, 0.9, 64  # steps tried, each 0.9 of the last; starts within a step
+UNTOUCHED = 1e-3 * GAIN  # of its energy: what a force may have done before a collision is followed
+ROUNDS = 20_000  # steps that a collision is followed for, about half a second
 
 
 def collisions(part: Any, probe: Probe) -> list[Limit]:
@@ -98,16 +100,19 @@ def largest_step(r: np.ndarray, a: np.ndarray, speed: float, most: float) -> flo
     Two particles meet head-on under the acceleration a(r) of their distance, by the steps of the
     integrator (v += a dt; r += v dt, which both integrators make but for where they call v the
     velocity), from many starts within a step. The linear limit 2 / omega does not see that a step
-    may carry them past where they should turn, from where they are thrown back too fast.
+    may carry them past where they should turn, from where they are thrown back too fast. They are
+    followed from where the force begins to tell: slow ones would long fly freely before.
     """
     dt = most * FINER ** np.arange(TRIALS - 1, -1, -1)[:, None]
-    x = r[0] + speed * dt * (np.arange(PHASES) + 0.5) / PHASES
+    done = np.cumsum(0.5 * np.abs(a[1:] + a[:-1]) * (r[:-1] - r[1:]))
+    edge = r[np.searchsorted(done, 0.5 * UNTOUCHED * speed**2)]
+    x = edge + speed * dt * (np.arange(PHASES) + 0.5) / PHASES
     v = np.full_like(x, -speed)
-    for _ in range(int(4.0 * r[0] / (speed * dt[0, 0])) + 2):
+    for _ in range(min(int(4.0 * edge / (speed * dt[0, 0])) + 2, ROUNDS)):
         near = np.interp(np.abs(x), r[::-1], a[::-1], right=0.0)
         v = v + np.where(x < 0, -near, near) * dt
         x = x + v * dt
-        if ((np.abs(x) > r[0]) & (x * v > 0)).all():
+        if ((np.abs(x) > edge) & (x * v > 0)).all():
             break
     gained = ((v / speed) ** 2).mean(axis=1) > 1.0 + GAIN
     return float(dt[max(int(np.argmax(gained)) - 1, 0), 0]) if gained.any() else most

@@ -4,6 +4,7 @@ import importlib
 
 import numpy as np
 import pytest
+import warp as wp
 
 import particlesim as ps
 from cases.stability import limit, simulation
@@ -133,3 +134,27 @@ def test_a_gas_without_contact_knows_its_collisions():
     assert report.binding.kind == "collision"
     # omega^2 = k / mu = 500 / 0.0005; a tenth to all of 2 / omega.
     assert 0.1 < report.dt / (2 / 1000) < 1.0
+
+
+def test_slow_grains_are_followed_where_they_touch(monkeypatch):
+    """Not while they fly freely; and a soft touch of linear springs knows no speed."""
+
+    @ps.law
+    def spring(r: float, k: float, d: float):
+        return k * wp.max(d - r, 0.0)
+
+    asked, looked = [], np.interp
+    monkeypatch.setattr(np, "interp", lambda *args, **kw: asked.append(1) or looked(*args, **kw))
+    found = []
+    for speed in (1e-6, 1e-4, 1e-2):
+        scene = ps.Scene()
+        scene.add_particles(
+            [(0, 0, 0), (0.022, 0, 0)], mass=1e-3, velocity=[(speed, 0, 0), (-speed, 0, 0)]
+        )
+        scene.add_interaction(ps.PairForce(spring, cutoff=0.025, k=1e5, d=0.02))
+        found.append(limit(scene, precision="float64") * np.sqrt(1e5 / 0.5e-3))
+        assert len(asked) < 1000
+        asked.clear()
+    # In 1 / omega, omega^2 = k / (m / 2): below the linear limit, 2; steps tried are 0.9 apart.
+    assert 0.2 < found[0] < 2
+    assert found == pytest.approx([found[0]] * 3, rel=0.11)
