@@ -34,13 +34,11 @@ class Writer:
         host[rows] = validate.rows(owner, name, value, shape[0], width)
         if name == "mass" and not (host[rows] > 0).all():
             raise validate.fail(owner, "mass", "be above 0", float(host[rows].min()), "give a mass")
-        largest = model.column("radius").max() if name == "radius" else np.inf
-        if name == "radius" and host.max() > largest:
-            raise validate.fail(
-                owner, "radius", "be at most the largest at the start, which contacts are looked "
-                f"for by ({largest:g})", float(host.max()),
-                "give the scene the largest that it will have",
-            )  # fmt: skip
+        if name == "inverse_mass" and not (host[rows] >= 0).all():
+            least = float(host[rows].min())
+            raise validate.fail(owner, name, "be at least 0", least, "0 holds a particle")
+        if name == "radius":
+            self._check_radius(owner, host)
         before = None if self.accounts is None else motion(model, state)
         array.assign(host)
         if name == "mass" and "inverse_mass" in state:
@@ -56,6 +54,20 @@ class Writer:
             kept[rows] = 0
             state[error].assign(kept)
         self._derive(name, np.unique(model.world_of[rows]).tolist())
+
+    def _check_radius(self, owner: str, radius: np.ndarray) -> None:
+        """Contacts are looked for by the radii of the start: by the largest, or that of a size."""
+        largest = np.full(len(radius), self.loop.model.column("radius").max())
+        for each in self.loop.neighbors.verlet:
+            largest = np.minimum(largest, each.halves())
+        beyond = radius > largest.astype(radius.dtype)
+        if beyond.any():
+            k = int(np.argmax(beyond))
+            raise validate.fail(
+                owner, f"radius[{k}]", "be at most the largest of its size at the start, which "
+                f"contacts are looked for by ({largest[k]:g})", float(radius[k]),
+                "give the scene the largest that it will have",
+            )  # fmt: skip
 
     def _derive(self, name: str, worlds: list[int]) -> None:
         """Have what depends on an array follow it, in these worlds."""

@@ -107,6 +107,16 @@ def test_a_world_goes_as_it_goes_alone(count, device):
     assert [block.world for block in batch.neighbors.lists[0].blocks].count(1) == 1
 
 
+def test_radii_may_change_within_a_size(refused):
+    sim = simulate(mixture(), "cpu")
+    radius = sim.get("radius")
+    small = int(np.argmin(radius))
+    with refused(rf"radius\[{small}\] must be at most the largest of its size"):
+        sim.set("radius", np.where(np.arange(len(radius)) == small, 0.2, radius))
+    sim.set("radius", 0.5 * radius)
+    sim.set("radius", radius)
+
+
 def test_threads_and_restarts(tmp_path):
     scene = mixture()
     runs = [

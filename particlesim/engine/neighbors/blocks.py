@@ -6,10 +6,15 @@ large particle has every small one look as far as two large ones would.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import warp as wp
+
+from ...kernels.engine.rows import blocks_type
+from ..model import Model
 
 LESS = 4.0  # times fewer candidates, from which blocks by size pay
 MOST = 8  # sizes of a world; those from a 128th of the largest down are one
@@ -22,6 +27,7 @@ class Block:
 
     ``reach`` is, for each block of the world in turn, cutoff + skin of a pair with that one;
     ``own`` that of two of this block, or enough of the largest for cells of that width.
+    ``largest`` is half the cutoff of its largest, by which it reaches.
     """
 
     world: int
@@ -29,6 +35,7 @@ class Block:
     end: int
     reach: np.ndarray
     own: float
+    largest: float
 
     @property
     def count(self) -> int:
@@ -82,7 +89,7 @@ def blocks(
         sizes = half[w]
         if sizes is None:
             reach = float(cutoff[w] + skin[w]) if cutoff[w] > 0 else np.inf
-            whole = Block(w, int(a), int(b), np.array([reach]), reach)
+            whole = Block(w, int(a), int(b), np.array([reach]), reach, float(cutoff[w] / 2))
             yield np.arange(a, b), [whole], float(skin[w])
             continue
         octave = _octaves(sizes)
@@ -93,7 +100,23 @@ def blocks(
         reach = largest[:, None] + largest + thin
         own = np.maximum(reach.diagonal(), reach.max() / 2**MOST)
         cut = [
-            Block(w, int(edges[k]), int(edges[k + 1]), reach[k], float(own[k]))
+            Block(w, int(edges[k]), int(edges[k + 1]), reach[k], float(own[k]), float(largest[k]))
             for k in range(len(count))
         ]
         yield a + np.argsort(octave, kind="stable"), cut, thin
+
+
+def blocks_struct(model: Model, of_worlds: Sequence[Sequence[Block]]) -> Any:
+    """The blocks of all worlds as kernels take them; the room in their rows is still to be set."""
+    every = [block for each in of_worlds for block in each]
+    counts = [block.count for block in every]
+    reach = np.zeros((len(every), max(map(len, of_worlds))))
+    for k, block in enumerate(every):
+        reach[k, : len(block.reach)] = block.reach
+    struct = blocks_type(model.precision)()
+    struct.of = model.array(np.repeat(np.arange(len(every)), counts), wp.int32)
+    struct.begin = model.array([block.begin for block in every], wp.int32)
+    struct.end = model.array([block.end for block in every], wp.int32)
+    struct.first = model.array(np.cumsum([0, *map(len, of_worlds)]), wp.int32)
+    struct.reach_squared = model.array(reach**2, model.precision.scalar)
+    return struct

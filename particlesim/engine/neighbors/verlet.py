@@ -24,7 +24,7 @@ from ..execution.launch import call, launch, when
 from ..model import Model
 from ..state import State
 from .all_pairs import AllPairs
-from .blocks import blocks
+from .blocks import blocks, blocks_struct
 from .cells import grid_over
 
 # Skin over cutoff, where Settings leaves it open; measured. Grains have few partners, so that rows
@@ -62,19 +62,7 @@ class VerletList(AllPairs):
         self.blocks = [block for _, of_world, _ in cuts for block in of_world]
         self.skin = np.array([thin for _, _, thin in cuts])
         self.reach = np.where(self.cutoff > 0, self.cutoff + self.skin, np.inf)
-        struct = rows.blocks_type(self.model.precision)()
-        counts = [block.count for block in self.blocks]
-        reach = np.zeros((len(counts), max(len(of_world) for _, of_world, _ in cuts)))
-        for k, block in enumerate(self.blocks):
-            reach[k, : len(block.reach)] = block.reach
-        edges = np.cumsum([0, *(len(of_world) for _, of_world, _ in cuts)])
-        model, whole = self.model, wp.int32
-        struct.of = model.array(np.repeat(np.arange(len(counts)), counts), whole)
-        struct.begin = model.array([block.begin for block in self.blocks], whole)
-        struct.end = model.array([block.end for block in self.blocks], whole)
-        struct.first = model.array(edges, whole)
-        struct.reach_squared = model.array(reach**2, model.precision.scalar)
-        self.struct = struct
+        self.struct = blocks_struct(self.model, [of_world for _, of_world, _ in cuts])
         return self.members_host[np.concatenate([order for order, _, _ in cuts])]
 
     def allocate(self, state: State) -> None:
@@ -267,6 +255,15 @@ class VerletList(AllPairs):
             self.mark_all()
             self.rebuild()
         return grown
+
+    def halves(self) -> np.ndarray:
+        """Up to which half of a cutoff each particle is looked for by size, (n,); else inf."""
+        found = np.full(self.model.particle_count, np.inf)
+        members = self.members.numpy()
+        for block in self.blocks:
+            if self.half[block.world] is not None:
+                found[members[block.begin : block.end]] = block.largest
+        return found
 
     def describe(self) -> str:
         grids = ["{} x {} x {}".format(*grid_shape(grid)) for grid, _ in self.grids.values()]
