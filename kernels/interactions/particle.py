@@ -11,14 +11,18 @@ from ..precision import Precision, function_from_source, register
 
 def _evaluation(
     law: wp.Function, arguments: tuple[str, ...], precision: Precision, data: Any, params: Any,
-    derived: int | None = None,
+    derived: int | None, force: bool,
 ) -> wp.Function:  # fmt: skip
-    """The law of particle i at x, or minus its derivative by one of its arguments."""
+    """The law of particle i at x, or minus its derivative by one of its arguments.
+
+    A law of time is one of double precision in any case; a force is then cut to the scene's.
+    """
     call = f"({', '.join(arguments)})"
-    lines = [f"return law{call}"]
+    lines = [f"f = law{call}"]
     if derived is not None:
         gradients = ", ".join(f"g{k}" for k in range(len(arguments)))
-        lines = [f"{gradients} = wp.grad(law){call}", f"return -g{derived}"]
+        lines = [f"{gradients} = wp.grad(law){call}", f"f = -g{derived}"]
+    lines.append("return Vec3(real(f[0]), real(f[1]), real(f[2]))" if force else "return f")
     source = "\n    ".join(["def law_of(i: int, w: int, x: Vec3, d: Data, p: Params):", *lines, ""])
     namespace = {
         "wp": wp, "law": law, "real": precision.scalar, "Vec3": precision.vec3, "Data": data,
@@ -34,7 +38,7 @@ def force_kernel(
     data: Any, params: Any,
 ) -> wp.Kernel:  # fmt: skip
     """Kernel: f += law(...) on each member, or minus its derivative by argument ``derived``."""
-    evaluate = _evaluation(law, arguments, precision, data, params, derived)
+    evaluate = _evaluation(law, arguments, precision, data, params, derived, force=True)
 
     @register
     def particle_force(
@@ -66,7 +70,7 @@ def energy_kernel(
     unwrapped position, for one that is the same on both sides nothing.
     """
     vec3, Box = precision.vec3, box_type(precision)
-    evaluate = _evaluation(law, arguments, precision, data, params)
+    evaluate = _evaluation(law, arguments, precision, data, params, None, force=False)
 
     @register
     def particle_energy(

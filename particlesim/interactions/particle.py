@@ -14,10 +14,11 @@ from ..engine.model import Model, filled, structure_of
 from ..engine.neighbors.lists import Neighbors
 from ..engine.state import State
 from ..kernels.interactions import particle as kernels
+from ..kernels.precision import FLOAT64
 from ..scene.law import Law, law
 from ..scene.law import law as make_law
 from ..scene.part import Interaction
-from .arguments import Arguments
+from .arguments import WIDTHS, Arguments
 
 
 class ParticleForce(Interaction):
@@ -34,7 +35,8 @@ class ParticleForce(Interaction):
     Args:
         law: Returns the force, ``wp.vec3``; None: it is derived from ``potential``. Its parameters
             are, by name, the particle's ``position``, ``velocity``, ``mass``, ``radius`` or an
-            attribute given to ``add_particles``; ``time`` [time]; or values given here.
+            attribute given to ``add_particles``; ``time`` [time]; or values given here. A law of
+            time is computed in double precision, where the time keeps its digits.
         group: Which particles feel it; None: all.
         potential: Law of the potential energy, a float, of the same parameters; None: none is
             reported.
@@ -75,7 +77,7 @@ class ParticleForce(Interaction):
         for each in self.arguments:
             self.parameters |= each.values
             self.quantities |= each.quantities
-            timed |= ("extra", "time") in each.sources
+            timed |= _timed(each)
         self.requires = frozenset({"force"} | self.quantities | ({"time"} if timed else set()))
 
     def _check_derived(self) -> None:
@@ -103,10 +105,13 @@ class ParticleForce(Interaction):
         for each in self.arguments:
             each.check(model.attributes)
         # Of the laws as they are now.
+        # Those of time in double precision: in single it has no digits left after a while.
+        laws = [(self.law, wp.vec3), (self.potential, float)]
         self.functions = [
-            each.function(model.precision, self.name, kind)
-            for each, kind in ((self.law, wp.vec3), (self.potential, float))
-            if each is not None
+            each.function(FLOAT64 if _timed(given) else model.precision, self.name, kind)
+            for given, (each, kind) in zip(
+                self.arguments, [pair for pair in laws if pair[0] is not None], strict=True
+            )
         ]
         members = model.members([peer.group for peer in self.peers], self.name)
         self.count = len(members)
@@ -136,9 +141,14 @@ class ParticleForce(Interaction):
 
     def _called(self, k: int) -> tuple[wp.Function, tuple[str, ...]]:
         """The k-th law's function, and the source of its arguments."""
-        source = self.arguments[k].source({"": "i"}, {"time": "real(d.time[w])"})
+        given = self.arguments[k]
+        source = given.source({"": "i"}, {"time": "d.time[w]"})
         at = {"d.x[i]": "x"}  # which may be another place
-        return self.functions[k], tuple(at.get(each, each) for each in source)
+        called = [at.get(each, each) for each in source]
+        if _timed(given):
+            kinds = [given.law.parameters[name] for name in given.names]
+            called = [_widened(*each) for each in zip(called, kinds, strict=True)]
+        return self.functions[k], tuple(called)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         inputs = [self.members, self.world, self.params, self.data, state.force]
@@ -150,6 +160,19 @@ class ParticleForce(Interaction):
             kernel = kernels.energy_kernel(*called, *self._types, self.repeated)
             inputs = [self.members, self.world, self.params, self.model.box, self.data, energy]
             launch(kernel, self.count, inputs, self.model.device)
+
+
+def _widened(source: str, kind: Any) -> str:
+    """Source of an argument in double precision."""
+    if kind in WIDTHS:
+        numbers = (f"wp.float64({source}[{k}])" for k in range(WIDTHS[kind]))
+        return f"wp.vec{WIDTHS[kind]}d({', '.join(numbers)})"
+    return source if kind is int else f"wp.float64({source})"
+
+
+def _timed(given: Arguments) -> bool:
+    """Whether a law takes the time."""
+    return ("extra", "time") in given.sources
 
 
 @law
