@@ -54,11 +54,27 @@ def measure_term(
 def virial_term(
     force: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any
 ) -> wp.Function:
-    """Term (0, r F / 2) of a force that is no derivative of an energy."""
-    evaluate = f"    f = law({', '.join(['r', *arguments])})"
-    names_of = {"law": force, "pair2": precision.vector(2)}
+    """Term (0, r F / 2) of a force that is given."""
     result = "pair2(real(0.0), real(0.5) * r * f)"
-    return _term("pair_virial", evaluate, result, names_of, precision, data, params)
+    return _plain_term("pair_virial", force, arguments, result, precision, data, params)
+
+
+def energy_term(
+    energy: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any
+) -> wp.Function:
+    """Term (u_ij / 2, 0) of the potential energy alone."""
+    result = "pair2(real(0.5) * f, real(0.0))"
+    return _plain_term("pair_energy", energy, arguments, result, precision, data, params)
+
+
+def _plain_term(
+    name: str, law: wp.Function, arguments: list[str], result: str, precision: Precision,
+    data: Any, params: Any,
+) -> wp.Function:  # fmt: skip
+    """A term of a law's value f."""
+    evaluate = f"    f = law({', '.join(['r', *arguments])})"
+    names_of = {"law": law, "pair2": precision.vector(2)}
+    return _term(name, evaluate, result, names_of, precision, data, params)
 
 
 def sum_term(

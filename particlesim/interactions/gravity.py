@@ -90,13 +90,15 @@ def closest_passage(part: Any, probe: Probe) -> list[Limit]:
 
 @law
 def gravity_potential(r: float, mass_i: float, mass_j: float, constant: float, softening: float):
-    return -constant * mass_i * mass_j / wp.sqrt(r * r + softening * softening)
+    inverse = 1.0 / wp.sqrt(r * r + softening * softening)
+    return -(constant * mass_i * inverse) * mass_j
 
 
 @law
 def gravity_force(r: float, mass_i: float, mass_j: float, constant: float, softening: float):
-    d2 = r * r + softening * softening
-    return -constant * mass_i * mass_j * r / (d2 * wp.sqrt(d2))
+    # In an order that stays in single precision's range wherever the force does.
+    inverse = 1.0 / wp.sqrt(r * r + softening * softening)
+    return -(constant * mass_i * inverse) * (mass_j * inverse) * (r * inverse)
 
 
 class Gravity(Pair):

@@ -134,9 +134,15 @@ class Pair(Interaction):
         return probe.response(self) + ([] if self.cutoff is None else collisions(self, probe))
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
-        make = kernels.virial_term if self.potential is None else kernels.measure_term
         out = {"energy": energy, "virial": virial}
-        self.loop.sum(self._term(make, 0), kernels.store_measure, out, 2)
+        if self.force is None:
+            terms = [self._term(kernels.measure_term, 0)]
+        else:
+            terms = [self._term(kernels.virial_term, -1)]
+            if self.potential is not None:
+                terms.append(self._term(kernels.energy_term, 0))
+        for term in terms:
+            self.loop.sum(term, kernels.store_measure, out, 2)
 
 
 class PairPotential(Pair):

@@ -93,3 +93,19 @@ def test_a_uniform_sphere_holds_three_fifths(device):
     assert found.potential[0] == pytest.approx(-3 / 5, rel=n ** (-2 / 3) + 1 / np.sqrt(n))
     # Scale-free forces: the virial sum is the energy.
     assert found.virial[0] == pytest.approx(found.potential[0], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("mass", "distance"), [(5.972e24, 1.496e11), (700.0, 2.4e13), (1e21, 1.3e14)]
+)
+def test_the_sun_in_single_precision(mass, distance, device):
+    """Products of masses and powers of distances leave its range; force and energy do not."""
+    scene = ps.Scene()
+    scene.add_particles([(0, 0, 0), (distance, 0, 0)], mass=[1.989e30, mass])
+    scene.add_interaction(ps.Gravity(G=6.6743e-11))
+    sim = ps.Simulation(scene, ps.Settings(precision="float32"), device=device)
+    energy = 6.6743e-11 * 1.989e30 * mass / distance
+    few = 10 * float(np.finfo(np.float32).eps)
+    np.testing.assert_allclose(sim.get("force")[:, 0], np.array([1, -1]) * energy / distance, few)
+    assert sim.diagnostics().potential[0] == pytest.approx(-energy, rel=few)
+    assert sim.diagnostics().virial[0] == pytest.approx(-energy, rel=few)
