@@ -90,15 +90,14 @@ def closest_passage(part: Any, probe: Probe) -> list[Limit]:
 
 @law
 def gravity_potential(r: float, mass_i: float, mass_j: float, constant: float, softening: float):
-    inverse = 1.0 / wp.sqrt(r * r + softening * softening)
-    return -(constant * mass_i * inverse) * mass_j
+    return -(constant * mass_i) * (mass_j / wp.sqrt(r * r + softening * softening))
 
 
 @law
 def gravity_force(r: float, mass_i: float, mass_j: float, constant: float, softening: float):
     # In an order that stays in single precision's range wherever the force does.
-    inverse = 1.0 / wp.sqrt(r * r + softening * softening)
-    return -(constant * mass_i * inverse) * (mass_j * inverse) * (r * inverse)
+    d2 = r * r + softening * softening
+    return -(constant * mass_i) * (mass_j / d2) * (r / wp.sqrt(d2))
 
 
 class Gravity(Pair):
