@@ -39,6 +39,7 @@ class Tuples:
             name: np.concatenate([part[name] for part in columns])[self.order]
             for name in columns[0]
         }
+        model.fits(owner, merged)
         self.Item, self.items = model.parameters("ConstraintItem", merged)
         self.model = model
 

@@ -90,6 +90,8 @@ class Model:
         self.periodic = self._periodicity()
         self.box = self._boxes()
         self.attributes = self._attributes()
+        names = ("position", "velocity", *self.attributes)
+        self.fits("Scene.add_particles", {name: self.column(name) for name in names})
 
     def rows(self, world: int) -> slice:
         """The rows of a world's particles."""
@@ -142,6 +144,25 @@ class Model:
         for name, column in columns.items():
             host[name] = column
         return wp.array(host, dtype=kind, device=self.device)
+
+    def fits(self, owner: str, columns: Mapping[str, np.ndarray]) -> None:
+        """Refuse numbers that become infinite in the kernels' precision, masses that become 0, and
+        parameters of which nothing is left; what is little beside others may well be nothing.
+        """
+        kind = self.precision.numpy
+        for name, column in columns.items():
+            given = np.asarray(column, dtype=np.float64)
+            with np.errstate(over="ignore", under="ignore"):
+                kept = given.astype(kind)
+            lost = np.isfinite(given) & ~np.isfinite(kept)
+            if name == "mass" or (name not in ("position", "velocity") and not kept.any()):
+                lost |= (kept == 0) & (given != 0)
+            if lost.any():
+                k = tuple(np.argwhere(lost)[0])
+                raise validate.fail(
+                    owner, name, f"be within {np.dtype(kind)}, about 1e-45 to 3e38",
+                    float(given[k]), "choose other units, or Settings(precision='float64')",
+                )  # fmt: skip
 
     def parameters(self, name: str, columns: dict[str, np.ndarray]) -> tuple[Any, wp.array]:
         """A parameter struct and its array, one entry a world or an item.

@@ -98,6 +98,7 @@ class Pair(Interaction):
         self.functions = [each.function(model.precision, self.name, float) for each in self.laws]
         self.pairs = neighbors.of(self, self.quantities)
         columns = self.columns(self.parameters)
+        model.fits(self.name, columns)
         cutoff = None if self.cutoff is None else np.array([peer.cutoff for peer in self.peers])
         columns |= squared_distances(model, cutoff)
         columns["cutoff_squared"] *= [peer.acts for peer in self.peers]

@@ -18,7 +18,7 @@ from ..scene.law import Law
 from ..scene.law import law as make_law
 from ..scene.part import Interaction
 from .arguments import Arguments
-from .pair_loop import PairLoop, check_names, squared_distances
+from .pair_loop import OWN, PairLoop, check_names, squared_distances
 
 # What a law may name of the pair, and how many numbers it returns by what it says it returns.
 PAIR = {"r": "r", "x_ij": "along", "distance_squared": "wp.where(apart, r2, near)"}
@@ -112,6 +112,7 @@ class PairSum:
         columns = squared_distances(model, cutoff)
         for each in (self.of_pair, self.last):
             columns |= {name: self._column(each, name) for name in each.values}
+        model.fits(self.name, {name: columns[name] for name in columns if name not in OWN})
         self.Params, self.params = model.parameters("PairSumParameters", columns)
 
     def _bound(

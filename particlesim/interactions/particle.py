@@ -119,6 +119,7 @@ class ParticleForce(Interaction):
         self.world = model.array(model.world_of[members], wp.int32)
         # A struct needs a field; the count does no harm.
         columns = self.columns(self.parameters) or {"none": np.zeros(model.world_count)}
+        model.fits(self.name, columns)
         self.Params, self.params = model.parameters("ParticleParameters", columns)
 
     def attach(self, model: Model, state: State) -> None:

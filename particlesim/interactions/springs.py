@@ -67,6 +67,7 @@ class Springs(Interaction):
             "rest_length": np.concatenate(lengths),
             "damping": np.concatenate([peer.damping for peer in self.peers]),
         }
+        model.fits(self.name, columns)
         rows = topology.incidence(pairs)
         self.count = len(rows["particle"])
         if not self.count:

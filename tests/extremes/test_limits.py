@@ -1,5 +1,6 @@
 """Numbers and intervals at the ends of what can be computed: bounded and right, or announced."""
 
+import re
 import subprocess
 import sys
 import warnings
@@ -236,3 +237,44 @@ def test_a_start_that_does_not_fit_is_announced(device):
         warnings.simplefilter("error")
         sim.run(1)
     np.testing.assert_allclose(sim.velocity, 0, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("part", "name", "value"),
+    [
+        (
+            lambda: ps.Springs([(0, 1)], stiffness=1e-46, rest_length=0.5),
+            "Springs: stiffness",
+            1e-46,
+        ),
+        (lambda: ps.UniformGravity((0, 1e40, 0)), "UniformGravity: acceleration", 1e40),
+        (lambda: ps.Gravity(G=1e-60), "Gravity: constant", 1e-60),
+        (lambda: ps.Distance([(0, 1)], 1.0, compliance=1e-50), "Distance: compliance", 1e-50),
+    ],
+    ids=["little", "much", "nothing", "stiff"],
+)
+def test_what_single_precision_cannot_hold_is_told(part, name, value, refused):
+    """A parameter that would be 0 or infinite there is refused, and taken in double precision."""
+    scene = ps.Scene()
+    scene.add_particles([(0, 0, 0), (1, 0, 0)])
+    made = part()
+    (scene.add_constraint if hasattr(made, "project") else scene.add_interaction)(made)
+    with refused(rf"{name} must be within float32, .*, got {re.escape(f'{value:g}')}; choose"):
+        ps.Simulation(scene, device="cpu")
+    ps.Simulation(scene, ps.Settings(precision="float64"), device="cpu")
+
+
+def test_masses_and_starts_that_single_precision_cannot_hold(refused):
+    for values, told in (
+        ({"mass": [1.0, 1e-60]}, "mass must be within float32.*got 1e-60"),
+        ({"mass": 1e40}, "mass must be within float32.*got 1e"),
+        ({"velocity": (1e39, 0, 0)}, "velocity must be within float32.*got 1e"),
+    ):
+        scene = ps.Scene()
+        scene.add_particles([(0, 0, 0), (1, 0, 0)], **values)
+        with refused(f"Scene.add_particles: {told}"):
+            ps.Simulation(scene, device="cpu")
+    # What is nothing beside others is no mistake: the cosine of a right angle, a Gaussian's tail.
+    scene = ps.Scene()
+    scene.add_particles([(0, 1e-300, 0), (1, 0, 0)], charge=[1.0, np.exp(-200)])
+    ps.Simulation(scene, device="cpu").run(1)
