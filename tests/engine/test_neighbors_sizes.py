@@ -44,11 +44,12 @@ def loops(request, monkeypatch):
 
 @pytest.mark.parametrize("count", [900, 300], ids=["grids", "direct"])
 @pytest.mark.parametrize("box", [None, 4.0], ids=["open", "periodic"])
-@pytest.mark.parametrize("skin", [None, 0.0], ids=["skin", "no skin"])
+@pytest.mark.parametrize("skin", [None, 0.0, 0.05], ids=["skin", "no skin", "given"])
 def test_all_pairs_that_touch_are_found(count, box, skin, loops):
     sim = simulate(mixture(count, box, points=40), "cpu", skin=skin)
     listed, rows = rows_of(sim)
     assert len(listed.blocks) > 2
+    assert listed.skin[0] == skin or (skin is None and 0 < listed.skin[0] < 0.05)
     x, radius = sim.position, sim.get("radius")
     d = x[:, None] - x[None]
     if box is not None:

@@ -76,6 +76,8 @@ def blocks(
     cutoff: np.ndarray,
     skin: np.ndarray,
     half: list[np.ndarray | None],
+    *,
+    given: bool,
 ) -> Iterator[tuple[np.ndarray, list[Block], float]]:
     """World by world: its members in the order of their slots, its blocks, and its skin.
 
@@ -84,6 +86,7 @@ def blocks(
         cutoff: Of each world, 0 where nothing is looked for.
         skin: Of each world, if it is one block.
         half: Of each world in blocks by size half the cutoff of its members, else None.
+        given: The skin is as somebody has set it, and not in proportion to the cutoff.
     """
     for w, (a, b) in enumerate(zip(begin, end, strict=True)):
         sizes = half[w]
@@ -94,8 +97,8 @@ def blocks(
             continue
         octave = _octaves(sizes)
         _, count, largest = _largest(sizes, octave)
-        # Those that are most are renewed most: the skin is theirs.
-        thin = float(skin[w] * largest[count.argmax()] / largest.max())
+        # Those that are most are renewed most: the skin is in proportion to theirs.
+        thin = float(skin[w] * (1.0 if given else largest[count.argmax()] / largest.max()))
         edges = a + np.concatenate([[0], np.cumsum(count)])
         reach = largest[:, None] + largest + thin
         own = np.maximum(reach.diagonal(), reach.max() / 2**MOST)

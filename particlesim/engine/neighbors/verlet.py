@@ -56,9 +56,13 @@ class VerletList(AllPairs):
         by_size = any(half is not None for half in self.half)
         self.sorted = self.sorted or bool(self.large.any()) or by_size
 
-    def _cut(self, skin: np.ndarray) -> np.ndarray:
+    def _cut(self) -> np.ndarray:
         """Cut the worlds into blocks; returns the members in the order of their slots."""
-        cuts = list(blocks(self.begin_host, self.end_host, self.cutoff, skin, self.half))
+        set_skin = self.model.settings.skin
+        share = np.where(self.for_interactions, SKIN, SKIN_OF_CONTACTS)
+        skin = self.cutoff * share if set_skin is None else np.full_like(self.cutoff, set_skin)
+        ranges, given = (self.begin_host, self.end_host), set_skin is not None
+        cuts = list(blocks(*ranges, self.cutoff, skin, self.half, given=given))
         self.blocks = [block for _, of_world, _ in cuts for block in of_world]
         self.skin = np.array([thin for _, _, thin in cuts])
         self.reach = np.where(self.cutoff > 0, self.cutoff + self.skin, np.inf)
@@ -70,11 +74,7 @@ class VerletList(AllPairs):
         real, vec3 = model.precision.scalar, model.precision.vec3
         self._check_box()
         self._choose_search()
-        given = model.settings.skin
-        share = np.where(self.for_interactions, SKIN, SKIN_OF_CONTACTS)
-        members = self._cut(
-            self.cutoff * share if given is None else np.full_like(self.cutoff, given)
-        )
+        members = self._cut()
         self.members = model.array(members, wp.int32)
         # A hair less than half the skin, for the rounding of the distances compared.
         margins = [
