@@ -154,7 +154,7 @@ def everything():
         ({"pairs": [[0, 12]]}, r"position must have shape \(13, 3\)"),
         (
             {"meshes": (np.eye(3), [[0, 1, 3]], np.eye(3))},
-            "triangles must hold indices",
+            "triangles must hold indices from 0 to 2",
         ),
         (
             {"meshes": (np.eye(3), [[0, 1, 2]], np.eye(3)[:2])},
@@ -187,7 +187,7 @@ def test_values_that_do_not_fit_are_refused(tmp_path, refused, changed, match):
         (lambda: MeshPrim(0, "x", BLUE, slice(0, 3), [[0, 1, 3]]), "hold indices from 0 to 2"),
         (
             lambda: Shape("mesh", (np.eye(3), [[0, 1, 3]])),
-            "triangles must hold indices",
+            "triangles must hold indices from 0 to 2",
         ),
         (lambda: StageInfo(points=[group()], layout={0: (1, 2)}), r"layout must have shape \(3,\)"),
     ],
