@@ -81,8 +81,11 @@ def slack_kernels(precision: Precision, periodic: Periodicity) -> tuple[wp.Kerne
         easing: Easing,
         dt: real,
         slack_io: wp.array(dtype=real),
+        virial_out: wp.array(dtype=real),
     ):
+        """And the virial of a substep begins."""
         i = pairs.order[first + wp.tid()]
+        virial_out[i] = real(0.0)
         if slack_io[i] > real(0.0):
             slack_io[i] = ease(slack_io[i], radius[i], dt, easing)
 

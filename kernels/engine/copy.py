@@ -24,11 +24,9 @@ def copy_kernel(dtype: Any) -> wp.Kernel:
 def zero_kernel(dtype: Any) -> wp.Kernel:
     """Kernel: target = 0, row by row."""
 
-    nothing = dtype(0.0)
-
     @register
     def zero_rows(first: int, target_out: wp.array(dtype=dtype)):
-        target_out[first + wp.tid()] = nothing
+        target_out[first + wp.tid()] = dtype()
 
     return zero_rows
 

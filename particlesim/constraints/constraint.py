@@ -193,6 +193,7 @@ class Constraint(ConstraintBase):
         solved = self.tuples.solved(self, state)
         self.project_kernel = kernels.project_kernel(solved)
         self.strain_kernel = kernels.strain_kernel(solved)
+        self.virial_kernel = virial_kernel(solved)
 
     def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if self.count and dt > 0:
@@ -223,10 +224,9 @@ class Constraint(ConstraintBase):
         """Add the virial of the multipliers of the last substep."""
         if not self.count:
             return
-        seats = self.tuples.seats()
-        kernel = virial_kernel(self.tuples.solved(self, state))
+        seats = self.tuples.seats
         inputs = [seats, self.model.box, self.struct, self.bodies, self.scale, virial]
-        launch(kernel, len(seats.particle), inputs, self.model.device)
+        launch(self.virial_kernel, len(seats.particle), inputs, self.model.device)
 
     def limits(self, probe: Probe) -> list[Limit]:
         """None, as XPBD is implicit; how fast it damps is told."""
@@ -243,12 +243,7 @@ class Constraint(ConstraintBase):
         return self.tuples.world if len(array) == self.count and name != "scale" else None
 
     def reset(self, worlds: Sequence[int]) -> None:
-        for name, array in {**self.persistent(), **self.readable()}.items():
-            world = self.worlds(name, array)
-            if world is not None:
-                host = array.numpy().copy()
-                host[np.isin(world, list(worlds))] = 0
-                array.assign(host)
+        self.forget({**self.persistent(), **self.readable()}, worlds)
 
     # Reading ------------------------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,6 @@ from ..engine.state import State
 from ..kernels.constraints import contact as kernels
 from ..kernels.constraints import contact_terms as terms
 from ..kernels.constraints.constraints import bodies_type
-from ..kernels.engine.copy import zero_kernel
 from ..kernels.interactions.pair import pair_kernel
 from .easing import EasedConstraint, Easing
 from .limits import contact_limits
@@ -199,8 +199,6 @@ class Contact(EasedConstraint):
         if not self.count or math.isinf(dt) or dt <= 0:
             return
         model, pairs = self.model, self.pairs.pairs
-        zero = zero_kernel(self.virial.dtype)
-        launch(zero, model.particle_count, [self.virial], model.device)
         measure, run_out = kernels.slack_kernels(model.precision, model.periodic)
         slack = self.easing.slack
         with when(self.easing.any_marked):
@@ -211,7 +209,7 @@ class Contact(EasedConstraint):
                 model.device,
             )
             call(self.easing.unmark)
-        inputs = [pairs, self.radius, self.easing.struct, dt, slack]
+        inputs = [pairs, self.radius, self.easing.struct, dt, slack, self.virial]
         launch(run_out, self.count, inputs, model.device)
 
     def _data(self, dt: float) -> Any:
@@ -268,6 +266,10 @@ class Contact(EasedConstraint):
 
     def readable(self) -> dict[str, wp.array]:
         return {"virial": self.virial} if self.count else {}
+
+    def reset(self, worlds: Sequence[int]) -> None:
+        super().reset(worlds)
+        self.forget(self.readable(), worlds)
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the speed of the particles against their radius."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -65,6 +66,7 @@ class Tuples:
             "position_error" in state, self.size, self.Item, constraint.relative, constraint.unit,
         )  # fmt: skip
 
+    @functools.cached_property
     def seats(self) -> Seats:
         """The tuples of every particle that is in one."""
         ends = self.particles.reshape(-1)

@@ -97,6 +97,15 @@ class Part:
     def reset(self, worlds: Sequence[int]) -> None:
         """Forget what these worlds have left behind."""
 
+    def forget(self, arrays: Mapping[str, Any], worlds: Sequence[int]) -> None:
+        """Zero the rows of these worlds, in arrays by name as of :meth:`persistent`."""
+        for name, array in arrays.items():
+            world = self.worlds(name, array)
+            if world is not None:
+                host = array.numpy().copy()
+                host[np.isin(world, list(worlds))] = 0
+                array.assign(host)
+
     def placed(self, worlds: Iterable[int]) -> None:
         """Positions in these worlds were written from outside."""
 

@@ -90,6 +90,19 @@ def test_two_that_collide(restitution, device):
     assert total == pytest.approx(known, rel=2 * speed * h / (2 * radius))
 
 
+def test_contacts_of_a_world_that_is_reset(device):
+    """The world that is at its start again has had no substep; the other keeps its last."""
+    scene = ps.Scene()
+    scene.add_particles([(0, 0, 0), (0.19, 0, 0)], velocity=[(1, 0, 0), (-1, 0, 0)], radius=0.1)
+    scene.add_constraint(ps.Contact())
+    sim = ps.Simulation(scene, SETTINGS.replace(substeps=1, dt=1e-3), device=device, worlds=2)
+    sim.step()
+    virial = sim.diagnostics().virial
+    assert (virial > 0).all()
+    sim.reset([1])
+    np.testing.assert_array_equal(sim.diagnostics().virial, [virial[0], 0])
+
+
 def test_worlds_and_checkpoints(device, tmp_path):
     """Each world has its own, which a checkpoint keeps and a reset forgets."""
     scenes = []
