@@ -90,8 +90,9 @@ class Model:
         self.periodic = self._periodicity()
         self.box = self._boxes()
         self.attributes = self._attributes()
-        names = ("position", "velocity", *self.attributes)
-        self.fits("Scene.add_particles", {name: self.column(name) for name in names})
+        for scene in {id(scene): scene for scene in self.scenes}.values():
+            names = ("position", "velocity", *scene.attributes)
+            self.fits("Scene.add_particles", {name: scene.column(name) for name in names})
 
     def rows(self, world: int) -> slice:
         """The rows of a world's particles."""

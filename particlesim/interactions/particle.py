@@ -106,12 +106,13 @@ class ParticleForce(Interaction):
             each.check(model.attributes)
         # Of the laws as they are now.
         # Those of time in double precision: in single it has no digits left after a while.
-        laws = [(self.law, wp.vec3), (self.potential, float)]
         self.functions = [
-            each.function(FLOAT64 if _timed(given) else model.precision, self.name, kind)
-            for given, (each, kind) in zip(
-                self.arguments, [pair for pair in laws if pair[0] is not None], strict=True
+            given.law.function(
+                FLOAT64 if _timed(given) else model.precision,
+                self.name,
+                wp.vec3 if given.law is self.law else float,
             )
+            for given in self.arguments
         ]
         members = model.members([peer.group for peer in self.peers], self.name)
         self.count = len(members)

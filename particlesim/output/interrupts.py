@@ -58,7 +58,8 @@ def terminable() -> Iterator[None]:
         signal.SIGTERM: signal.SIG_DFL, signal.SIGINT: signal.default_int_handler,
     }  # fmt: skip
     ours = [number for number in SIGNALS if signal.getsignal(number) is usual[number]]
-    for number in ours if _in_main_thread() else ():
+    ours = ours if _in_main_thread() else []
+    for number in ours:
         signal.signal(number, _ask)
     sys.unraisablehook = lambda told: None if isinstance(told.exc_value, ENDS) else hook(told)
     try:
@@ -66,7 +67,7 @@ def terminable() -> Iterator[None]:
         if _asked is not None:
             _ask(_asked, None)
     finally:
-        for number in ours if _in_main_thread() else ():
+        for number in ours:
             signal.signal(number, usual[number])
         sys.unraisablehook = hook
         heard()

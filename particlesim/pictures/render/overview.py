@@ -32,18 +32,18 @@ class Overview:
     def add(self, geometry: Geometry) -> None:
         """What there is to see in one more frame."""
         self.all.add(*geometry.points())
-        self._add_particles(self.most, geometry, np.zeros(3))
+        self._add_most(geometry)
         self.most.add(*geometry.points(*(name for name in SHAPES if name != "ball")))
 
-    def add_around(self, geometry: Geometry, middle: np.ndarray) -> None:
-        """The particles of one more frame, seen from their middle (see :func:`middle`)."""
+    def add_around(self, geometry: Geometry, origin: np.ndarray) -> None:
+        """The particles of one more frame, seen from an origin as their :func:`middle`."""
         points, radius = geometry.points(*_moving(geometry))
-        self.all.add(points - middle, radius)
-        self._add_particles(self.most, geometry, middle)
+        self.all.add(points - origin, radius)
+        self._add_most(geometry, origin)
 
-    def _add_particles(self, framing: Framing, geometry: Geometry, middle: np.ndarray) -> None:
+    def _add_most(self, geometry: Geometry, origin: Any = 0.0) -> None:
         particles, radius = geometry.points("ball")
-        framing.add(particles - middle, radius, MOST if len(particles) > MANY else 1.0)
+        self.most.add(particles - origin, radius, MOST if len(particles) > MANY else 1.0)
 
     def camera(self) -> Camera:
         """The camera; of nothing, one that sees the origin."""
