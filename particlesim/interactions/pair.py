@@ -77,6 +77,7 @@ class Pair(Interaction):
             self.parameters |= argument.values
             self.quantities |= argument.quantities
         self.requires = frozenset({"force"}) | self.quantities
+        self.reads_velocity = "velocity" in self.quantities
 
     @property
     def acts(self) -> bool:

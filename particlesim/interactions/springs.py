@@ -68,6 +68,7 @@ class Springs(Interaction):
             "damping": np.concatenate([peer.damping for peer in self.peers]),
         }
         model.fits(self.name, columns)
+        self.reads_velocity = bool(columns["damping"].any())
         rows = topology.incidence(pairs)
         self.count = len(rows["particle"])
         if not self.count:

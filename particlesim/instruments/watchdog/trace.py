@@ -18,7 +18,7 @@ import numpy as np
 
 from ...engine.frames import Frames
 from ...engine.loop import Loop
-from ...engine.observers import FORCE, Observer
+from ...engine.observers import FOLLOW, FORCE, Observer
 from .limits import FAST, FINITE, Limits
 
 REFINEMENTS = (1, 2, 4)
@@ -118,7 +118,7 @@ class _Look(Observer):
         self.start = [self._push(each.row) for each in self.pending]
 
     def after(self, part: Any, stage: str) -> None:
-        self._see(part.name, ("force",) if stage == FORCE else ("position", "velocity"))
+        self._see(part.name, ("force",) if stage in (FORCE, FOLLOW) else ("position", "velocity"))
         with np.errstate(invalid="ignore", over="ignore"):
             for each, start, mine in zip(self.pending, self.start, self.pushes, strict=True):
                 mine[part.name] = mine.get(part.name, 0.0) + self._push(each.row) - start
