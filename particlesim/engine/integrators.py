@@ -14,6 +14,7 @@ from ..kernels.engine.integrate import (
 )
 from ..scene.settings import INTEGRATORS, Settings
 from .execution.launch import launch
+from .limit import explicit_step, predicted_step
 from .model import Model
 from .state import State
 
@@ -92,6 +93,10 @@ class Integrator:
         """What reports call it."""
         return next((n for n, each in METHODS.items() if each is type(self)), type(self).__name__)
 
+    def largest_step(self, omega_squared: float, gamma: float) -> float:
+        """Largest stable step of x'' = -omega^2 x - gamma x', the damping not implicit [time]."""
+        return explicit_step(omega_squared, gamma)
+
     def begin(self, dt: float) -> None:
         """Before the forces."""
 
@@ -158,6 +163,9 @@ class VelocityVerlet(Integrator):
 
     order = 2
     carries_forces = True
+
+    def largest_step(self, omega_squared: float, gamma: float) -> float:
+        return predicted_step(omega_squared, gamma)
 
     def begin(self, dt: float) -> None:
         self.move(0.5 * dt, dt)

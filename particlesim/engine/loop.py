@@ -190,6 +190,11 @@ class Loop:
         """Simulated time since the start [s]."""
         return self.frame * self.settings.dt
 
+    @property
+    def work(self) -> float:
+        """Particles and pairs that an evaluation of the forces looks at, about."""
+        return self.model.particle_count + sum(each.work for each in self.neighbors.lists)
+
     def get(self, name: str) -> np.ndarray:
         """A per-particle array, copied to the host."""
         return self.held(name).numpy().copy()
