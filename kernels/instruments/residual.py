@@ -37,6 +37,44 @@ def tuples_kernel(law: Solved) -> wp.Kernel:
 
 
 @functools.cache
+def off_kernel(law: Solved) -> wp.Kernel:
+    """Kernel: |C| / |grad C| of each tuple without compliance, in parts of its extent."""
+    real, Box, Tuples, Bodies = law.types
+    size, view = law.size, view_function(law)
+
+    @register
+    def measure_off(
+        first: int,
+        box: wp.array(dtype=Box),
+        t: Tuples,
+        b: Bodies,
+        off_out: wp.array(dtype=real),
+    ):
+        r = first + wp.tid()
+        _x, _e, X, C, G = view(r, box, t, b)
+        extent = real(0.0)
+        slope = real(0.0)
+        free = real(0.0)
+        for a in range(wp.static(size)):
+            extent = wp.max(extent, wp.length(X[a] - X[0]))
+            slope = slope + wp.length_sq(G[a])
+            free = free + b.w[t.particle[r][a]]
+        if t.one_sided != 0:
+            C = wp.min(C, real(0.0))
+        if t.breakable != 0:
+            if t.broken[r] != 0:
+                C = real(0.0)
+        if t.item[r].compliance > real(0.0) or free == real(0.0):
+            C = real(0.0)
+        off = real(0.0)
+        if C != real(0.0):
+            off = wp.abs(C) / (wp.sqrt(slope) * extent)
+        off_out[r] = off
+
+    return measure_off
+
+
+@functools.cache
 def boundary_kernel(form: Form) -> wp.Kernel:
     """Kernel: how deep each particle is inside of a boundary, on its worst side."""
     _, sides, precision, params, compensated, _ = form

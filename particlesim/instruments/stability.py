@@ -93,25 +93,27 @@ SAFETY = 0.5  # of the limit, at most, where the settings leave it open
 NEGLIGIBLE = 0.97  # of the tightest limit: what several parts do together matters below it
 
 _checked: weakref.WeakSet[Loop] = weakref.WeakSet()
+_warned: weakref.WeakSet[Loop] = weakref.WeakSet()
 
 
 class StabilityWarning(UserWarning):
     """Settings are past the limit of a scene."""
 
 
-def stability(loop: Loop, quick: bool = False) -> Stability:
-    """The limits of all parts at the present moment (see ``Simulation.stability``).
+def stability(loop: Loop) -> Stability:
+    """The limits of all parts now and on the path ahead (see ``Simulation.stability``)."""
+    limits = _limits_now(loop)
+    ahead = look_ahead(loop, limits).limit
+    limits += [] if ahead is None else [ahead]
+    return Stability(_in_order(limits), loop.settings)
 
-    ``quick``: limits that the settings surely keep may be smaller than they are.
-    """
-    limits = _limits_now(loop, quick)
-    if not quick:
-        ahead = look_ahead(loop, limits).limit
-        limits += [] if ahead is None else [ahead]
-    return Stability(sorted(limits, key=lambda limit: limit.dt), loop.settings)
+
+def _in_order(limits: list[Limit]) -> list[Limit]:
+    return sorted(limits, key=lambda limit: limit.dt)
 
 
 def _limits_now(loop: Loop, quick: bool = False) -> list[Limit]:
+    """Those of the present; ``quick``: what the settings surely keep may be smaller than it is."""
     limits: list[Limit] = []
     if loop.model.particle_count:
         with Probe(loop, quick) as probe:
@@ -135,19 +137,26 @@ def _together(probe: Probe, limits: list[Limit]) -> list[Limit]:
     return probe.together(parts)
 
 
-def warn_if_past(loop: Loop) -> None:
-    """Warn, once a simulation, if its settings are past the limit, or its start does not fit."""
-    if loop in _checked or not loop.settings.dt > 0:
+def warn_if_past(loop: Loop, again: bool = False) -> None:
+    """Warn, once a simulation, if its settings are past the limit, or its start does not fit.
+
+    Args:
+        loop: What is in motion.
+        again: It has become faster: only the limits, where nothing was said of them.
+    """
+    if not loop.settings.dt > 0 or (loop in _warned if again else loop in _checked):
         return
-    _checked.add(loop)
-    for said in (misfit(loop), *(part.complaint() for part in loop.parts)):
-        if said:
-            warnings.warn(said, StabilityWarning, stacklevel=3)
-    if stability(loop, quick=True).safe:
-        return
-    report = stability(loop)
+    if not again:
+        _checked.add(loop)
+        for said in (misfit(loop), *(part.complaint() for part in loop.parts)):
+            if said:
+                warnings.warn(said, StabilityWarning, stacklevel=3)
+    report = Stability(_in_order(_limits_now(loop, quick=True)), loop.settings)
+    if not report.safe or not again:
+        report = stability(loop)
     if report.safe or report.binding is None:
         return
+    _warned.add(loop)
     limit = report.binding
     remedy = "look at what pushes it"
     if math.isfinite(report.substeps):

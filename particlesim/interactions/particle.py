@@ -84,6 +84,9 @@ class ParticleForce(Interaction):
         self.requires = frozenset({"force"} | self.quantities | ({"time"} if timed else set()))
         self.implicit = self.law is not None and _is_implicit(self.law)
         self.reads_velocity = "velocity" in self.quantities and not self.implicit
+        self.conservative = self.potential is not None and not (
+            timed or "velocity" in self.quantities
+        )
 
     def _check_derived(self) -> None:
         if self.potential is None:

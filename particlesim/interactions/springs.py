@@ -69,6 +69,7 @@ class Springs(Interaction):
         }
         model.fits(self.name, columns)
         self.reads_velocity = bool(columns["damping"].any())
+        self.conservative = not self.reads_velocity
         rows = topology.incidence(pairs)
         self.count = len(rows["particle"])
         if not self.count:

@@ -156,6 +156,7 @@ class Interaction(Part):
     requires: frozenset[str] = frozenset({"force"})
     cutoff: float | None = None
     reads_velocity: bool = True  # in any other way than that of ``follow``
+    conservative: bool = False  # `measure` adds the potential of all that it does
     implicit: bool = False  # adds df/dv of its force to ``state.force_slope``, and has ``follow``
 
     def apply(self, state: Any, neighbors: Any, dt: float) -> None:
