@@ -80,10 +80,11 @@ def measure_kernel(law: Solved) -> wp.Kernel:
             pull = C / t.item[r].compliance
             if t.one_sided != 0 and C >= real(0.0):
                 pull = real(0.0)
-            w = -pull * wp.dot(G[a], X[a] - X[0])
+            w = -wp.float64(pull) * wp.float64(wp.dot(G[a], X[a] - X[0]))
             if wp.isfinite(w):
-                energy_io[i] = energy_io[i] + wp.float64(C * pull / real(wp.static(2.0 * size)))
-                virial_io[i] = virial_io[i] + wp.float64(w)
+                share = wp.float64(wp.static(1.0 / (2.0 * size)))
+                energy_io[i] = energy_io[i] + wp.float64(C) * wp.float64(pull) * share
+                virial_io[i] = virial_io[i] + w
 
     return constraint_measure
 
@@ -91,7 +92,7 @@ def measure_kernel(law: Solved) -> wp.Kernel:
 @functools.cache
 def virial_kernel(law: Solved) -> wp.Kernel:
     """Kernel: virial lam / dt^2 sum_a grad_a C . x_a of multipliers, to each particle its share."""
-    real, Box, Tuples, Bodies = law.types
+    _real, Box, Tuples, Bodies = law.types
     view = view_function(law)
 
     @register
@@ -101,7 +102,7 @@ def virial_kernel(law: Solved) -> wp.Kernel:
         box: wp.array(dtype=Box),
         t: Tuples,
         b: Bodies,
-        scale: wp.array(dtype=real),
+        scale: wp.array(dtype=wp.float64),
         virial_io: wp.array(dtype=wp.float64),
     ):
         k = first + wp.tid()
@@ -110,8 +111,9 @@ def virial_kernel(law: Solved) -> wp.Kernel:
             r = seats.tuple[n]
             a = seats.seat[n]
             _x, _e, X, _C, G = view(r, box, t, b)
-            w = t.lam[r] * scale[0] * wp.dot(G[a], X[a] - X[0])
+            lam = wp.float64(t.lam[r]) * scale[0] * wp.float64(b.unit)
+            w = lam * wp.float64(wp.dot(G[a], X[a] - X[0]))
             if wp.isfinite(w):
-                virial_io[i] = virial_io[i] + wp.float64(w)
+                virial_io[i] = virial_io[i] + w
 
     return constraint_virial

@@ -43,6 +43,16 @@ class Tuples:
         model.fits(owner, merged)
         self.Item, self.items = model.parameters("ConstraintItem", merged)
         self.model = model
+        steps = [topology.steps(model, w, index) for w, index in enumerate(each)]
+        self.shortest = np.concatenate([d.min(axis=1, initial=np.inf) for d in steps])[self.order]
+        longest = np.concatenate([d.max(axis=1, initial=0.0) for d in steps])[self.order]
+        model.squares_fit(owner, "distances", np.maximum(longest, merged.get("rest_length", 0.0)))
+
+    def complaint(self, owner: str) -> str:
+        """That places are too coarse for how far the particles of a tuple are apart; or nothing."""
+        if self.size < 2:
+            return ""
+        return self.model.unresolved(owner, "distances", self.shortest, self.particles)
 
     def struct(self, *, inequality: bool, breakable: bool) -> Any:
         """The tuples as the kernels take them, with multipliers and, if breakable, marks."""
@@ -87,6 +97,7 @@ class Tuples:
 def bodies(model: Model, state: State) -> Any:
     """The arrays of the state that the kernels of constraints take."""
     result = bodies_type(model.precision)()
+    result.unit = model.mass_unit
     names = {
         "x": "position", "x_error": "position_error", "v": "velocity", "w": "inverse_mass",
         "correction": "correction",

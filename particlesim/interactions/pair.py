@@ -100,7 +100,7 @@ class Pair(Interaction):
         columns = self.columns(self.parameters)
         model.fits(self.name, columns)
         cutoff = None if self.cutoff is None else np.array([peer.cutoff for peer in self.peers])
-        columns |= squared_distances(model, cutoff)
+        columns |= squared_distances(self.name, model, cutoff)
         columns["cutoff_squared"] *= [peer.acts for peer in self.peers]
         self.Params, self.params = model.parameters("PairParameters", columns)
 
@@ -114,6 +114,17 @@ class Pair(Interaction):
         """Whether i feels of j what j feels of i, as far as tries on some pairs tell."""
         members = np.unique(self.pairs.members_host)
         return all(is_symmetric(each, self.model, members, self.cutoff) for each in self.arguments)
+
+    def complaint(self) -> str:
+        """That places are too coarse for the cutoff, or for how far particles are apart."""
+        members = self.pairs.members_host
+        if self.cutoff is None:
+            name, lengths = "position", self.model.apart()[1]
+        else:
+            name, lengths = "cutoff", np.array([peer.cutoff for peer in self.peers])
+        return self.model.unresolved(
+            self.name, name, lengths[self.model.world_of[members]], members
+        )
 
     def fields_of(self, pairs: AllPairs) -> dict[str, wp.array]:
         """What the term reads, in the order of a list's slots."""

@@ -68,6 +68,7 @@ class Springs(Interaction):
             "damping": np.concatenate([peer.damping for peer in self.peers]),
         }
         model.fits(self.name, columns)
+        self.ends, self.lengths = pairs, columns["rest_length"]
         rows = topology.incidence(pairs)
         self.count = len(rows["particle"])
         if not self.count:
@@ -97,6 +98,10 @@ class Springs(Interaction):
         ]
         most = spring_bound(pairs, columns[0], w), spring_bound(pairs, columns[1], w)
         return probe.response(self, most)
+
+    def complaint(self) -> str:
+        """That places are too coarse for the rest lengths."""
+        return self.model.unresolved(self.name, "rest_length", self.lengths, self.ends)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         if not self.count:

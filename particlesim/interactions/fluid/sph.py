@@ -17,7 +17,7 @@ from ...engine.probe import Probe
 from ...engine.state import State
 from ...kernels.interactions import sph as kernels
 from ...scene.part import Interaction
-from ..pair_loop import PairLoop, squared_distances
+from ..pair_loop import PairLoop
 from .equations_of_state import EquationOfState
 from .limits import fluid_limits
 from .smoothing import SMOOTHING, SUPPORT
@@ -149,9 +149,9 @@ class SPH(Interaction):
         columns["inverse_h"] = 1.0 / h
         with np.errstate(divide="ignore", over="ignore", under="ignore"):
             columns["sigma"] = self.smoothing.sigma / h**self.dimension
-        columns |= squared_distances(model, SUPPORT * h)
-        columns["closest_squared"] = (COINCIDENT * h) ** 2
+        columns |= {"cutoff_squared": (SUPPORT * h) ** 2, "closest_squared": (COINCIDENT * h) ** 2}
         self._check_range(columns)
+        model.fits(self.name, {name: columns[name] for name in self.parameters})
         self.Params, self.params = model.parameters("FluidParameters", columns)
 
     def _check_range(self, columns: dict[str, np.ndarray]) -> None:
@@ -213,9 +213,17 @@ class SPH(Interaction):
         return fluid_limits(self, probe)
 
     def complaint(self) -> str:
-        """That the masses do not make the rest density, where they are far from it."""
+        """That places are too coarse, or that the masses do not make the rest density, where they
+        are far from it.
+        """
         rest = np.array([peer.parameters.get("rest_density", 0.0) for peer in self.peers])
         members = self.pairs.members_host
+        h = np.array([peer.parameters["smoothing_length"] for peer in self.peers])
+        coarse = self.model.unresolved(
+            self.name, "smoothing_length", h[self.model.world_of[members]], members
+        )
+        if coarse:
+            return coarse
         rest = rest[self.model.world_of[members]]
         if not len(members) or not rest.all():
             return ""
