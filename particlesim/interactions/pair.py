@@ -21,6 +21,7 @@ from ..scene.law import Law
 from ..scene.law import law as make_law
 from ..scene.part import Interaction
 from .arguments import Arguments
+from .consistency import fades
 from .exchange import is_symmetric, named
 from .pair_limits import collisions
 from .pair_loop import PairLoop, check_names, squared_distances
@@ -116,15 +117,16 @@ class Pair(Interaction):
         return all(is_symmetric(each, self.model, members, self.cutoff) for each in self.arguments)
 
     def complaint(self) -> str:
-        """That places are too coarse for the cutoff, or for how far particles are apart."""
+        """That places are too coarse for the cutoff, or for how far particles are apart; that a
+        force without a cutoff reaches across half a periodic box.
+        """
         members = self.pairs.members_host
         if self.cutoff is None:
             name, lengths = "position", self.model.apart()[1]
         else:
             name, lengths = "cutoff", np.array([peer.cutoff for peer in self.peers])
-        return self.model.unresolved(
-            self.name, name, lengths[self.model.world_of[members]], members
-        )
+        lengths = lengths[self.model.world_of[members]]
+        return self.model.unresolved(self.name, name, lengths, members) or fades(self)
 
     def fields_of(self, pairs: AllPairs) -> dict[str, wp.array]:
         """What the term reads, in the order of a list's slots."""

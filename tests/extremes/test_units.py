@@ -70,7 +70,7 @@ def test_energies_beyond_single_precision(simulate):
         (lambda: ps.LennardJones(cutoff=2.5), "LennardJones: cutoff"),
         (lambda: ps.Gravity(), "Gravity: position"),
         (
-            lambda: ps.SPH(smoothing_length=1.0, equation_of_state=ps.Polytrope(1.0, 1.0)),
+            lambda: ps.SPH(smoothing_length=3.0, equation_of_state=ps.Polytrope(1.0, 1.0)),
             "SPH: smoothing_length",
         ),
     ],

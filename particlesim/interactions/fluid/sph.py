@@ -21,6 +21,7 @@ from ..pair_loop import PairLoop
 from .equations_of_state import EquationOfState
 from .limits import fluid_limits
 from .smoothing import SMOOTHING, SUPPORT
+from .starts import complaint
 from .viscosities import Viscosity
 
 # What laws may name beside smoothing_length, rest_density and the parameters of their part.
@@ -30,9 +31,6 @@ VARIABLES = {
     "sound_speed": ("density", "pressure"),
     "term": ("approach", "distance_squared", "density", "sound_speed"),
 }
-# Parts of the rest density between which the median of a start lies that has masses that fit; free
-# surfaces halve it there.
-LEAST_DENSE, MOST_DENSE = 0.4, 1.6
 COINCIDENT = 1e-6  # closer than this, in parts of h, particles count as coincident
 
 
@@ -49,6 +47,9 @@ class SPH(Interaction):
 
     The step is bounded by the time of sound across a smoothing length and by the acceleration
     (Monaghan 1992, on time stepping): dt < 0.4 h / (c (1 + 0.6 alpha)) and dt < 0.25 sqrt(h / |a|).
+
+    A run warns of a start whose masses do not make the rest density at their spacing, whose
+    smoothing length is below the spacing, or which moves faster than a liquid's sound.
 
     State arrays ``density`` and ``pressure`` belong to the positions at which the forces were
     taken last.
@@ -213,32 +214,8 @@ class SPH(Interaction):
         return fluid_limits(self, probe)
 
     def complaint(self) -> str:
-        """That places are too coarse, or that the masses do not make the rest density, where they
-        are far from it.
-        """
-        rest = np.array([peer.parameters.get("rest_density", 0.0) for peer in self.peers])
-        members = self.pairs.members_host
-        h = np.array([peer.parameters["smoothing_length"] for peer in self.peers])
-        coarse = self.model.unresolved(
-            self.name, "smoothing_length", h[self.model.world_of[members]], members
-        )
-        if coarse:
-            return coarse
-        rest = rest[self.model.world_of[members]]
-        if not len(members) or not rest.all():
-            return ""
-        kept = [(each, wp.clone(each)) for each in (self.state.density, self.state.pressure)]
-        self.update_density()
-        share = float(np.median(self.state.density.numpy()[members] / rest))
-        for array, before in kept:
-            wp.copy(array, before)
-        if LEAST_DENSE < share < MOST_DENSE:
-            return ""
-        mass = float(np.median(self.model.column("mass")[members]))
-        return (
-            f"{self.name}: mass must make the rest density at the particles' spacing, got "
-            f"{mass:.4g}, which makes {share:.3g} of it; give about {mass / share:.4g}."
-        )
+        """That masses, the smoothing length or the speed of sound do not fit the start."""
+        return complaint(self)
 
     def sound_speeds(self, probe: Probe) -> np.ndarray:
         """Speed of sound at the present densities, of each member [length/time]."""
