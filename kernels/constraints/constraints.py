@@ -15,8 +15,6 @@ from ..engine.integrate import compensated_sum
 from ..engine.loops import Periodicity, box_type, minimum_image
 from ..precision import APART, Precision, function, function_from_source, register, structure
 
-LARGEST = 1.0e30  # C / |grad C|^2 beyond it, or NaN, comes of a gradient that does not exist
-
 
 @dataclass(frozen=True)
 class Solved:
@@ -55,6 +53,7 @@ def bodies_type(precision: Precision) -> Any:
         "w": wp.array(dtype=real),
         "correction": wp.array(dtype=vec3),
         "unit": real,  # of mass, a power of two
+        "most": real,  # C / |grad C|^2 beyond it, or NaN, comes of a gradient that does not exist
     }
     return structure(f"Bodies_{precision.name}", fields)
 
@@ -235,7 +234,7 @@ def project_kernel(law: Solved) -> wp.Kernel:
                 new = real(0.0)
         d_lam = new - lam
         # All pinned, or no gradient (a comparison with NaN is false): nothing sensible to do.
-        if s > real(0.0) and wp.abs(d_lam) * total < real(LARGEST):
+        if s > real(0.0) and wp.abs(d_lam) * total < b.most:
             t.lam[r] = new
             for a in range(wp.static(size)):
                 place(ids[a], x[a], e[a], G[a] * (w[a] * d_lam), b)

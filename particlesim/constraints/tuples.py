@@ -15,6 +15,9 @@ from ..engine.state import State
 from ..kernels.constraints.constraint_force import Seats
 from ..kernels.constraints.constraints import Solved, bodies_type, tuples_type
 
+# Of C / |grad C|^2, which for an angle goes with the square of lengths, in a scene of size 1.
+LARGEST = 1e30
+
 
 class Tuples:
     """The tuples of the peers of a constraint, one peer a world.
@@ -98,6 +101,10 @@ def bodies(model: Model, state: State) -> Any:
     """The arrays of the state that the kernels of constraints take."""
     result = bodies_type(model.precision)()
     result.unit = model.mass_unit
+    size = float(model.apart()[0].max(initial=1.0))
+    with np.errstate(over="ignore"):
+        largest = LARGEST * np.square(size)
+    result.most = min(largest, float(np.finfo(model.precision.numpy).max))
     names = {
         "x": "position", "x_error": "position_error", "v": "velocity", "w": "inverse_mass",
         "correction": "correction",

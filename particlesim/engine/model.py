@@ -141,6 +141,7 @@ class Model:
             1.0, self.box_length, out=np.zeros_like(self.box_length), where=self.box_length > 0
         )
         columns = {"lower": self.box_lower, "length": self.box_length, "inverse": inverse}
+        self.fits("Scene", {"periodic": np.stack([self.box_length, inverse])})
         return self.structures(Box, columns)
 
     def structures(self, kind: Any, columns: dict[str, np.ndarray]) -> wp.array:

@@ -121,10 +121,10 @@ class Pair(Interaction):
         force without a cutoff reaches across half a periodic box.
         """
         members = self.pairs.members_host
-        if self.cutoff is None:
-            name, lengths = "position", self.model.apart()[1]
-        else:
-            name, lengths = "cutoff", np.array([peer.cutoff for peer in self.peers])
+        name, lengths = "spacing", self.model.apart()[1]
+        if self.cutoff is not None:
+            cutoff = np.array([peer.cutoff for peer in self.peers])
+            name, lengths = "cutoff or spacing", np.minimum(lengths, cutoff)
         lengths = lengths[self.model.world_of[members]]
         return self.model.unresolved(self.name, name, lengths, members) or fades(self)
 

@@ -83,7 +83,7 @@ def turning(omega=1.0):
 def of_fields():
     for name, method in METHODS.items():
         for phase in (0.02, 0.1, 0.5, 2.0, 10.0):
-            frames = 60 if phase > 0.3 else 100
+            frames = 60 if phase > 0.3 else 30
             substeps = 1 if phase > 0.3 else round(6 / phase)
             yield Row(f"magnetic field, omega h = {phase}, {name}", turning, slower_than(1.0, 1.05),
                 frames, {"dt": phase * substeps, "substeps": substeps, **method})
