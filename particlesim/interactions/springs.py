@@ -57,18 +57,20 @@ class Springs(Interaction):
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
-        pairs = topology.merged(self.name, "pairs", model, [peer.pairs for peer in self.peers])
+        pairs = self.ends = topology.merged(
+            self.name, "pairs", model, [peer.pairs for peer in self.peers]
+        )
         lengths = [
             topology.rest_lengths(self.name, model, w, peer.pairs, peer.rest_length)
             for w, peer in enumerate(self.peers)
         ]
+        self.lengths = np.concatenate(lengths)
         columns = {
             "stiffness": np.concatenate([peer.stiffness for peer in self.peers]),
-            "rest_length": np.concatenate(lengths),
+            "rest_length": self.lengths,
             "damping": np.concatenate([peer.damping for peer in self.peers]),
         }
         model.fits(self.name, columns)
-        self.ends, self.lengths = pairs, columns["rest_length"]
         rows = topology.incidence(pairs)
         self.count = len(rows["particle"])
         if not self.count:
