@@ -80,10 +80,11 @@ def measure_kernel(law: Solved) -> wp.Kernel:
             pull = C / t.item[r].compliance
             if t.one_sided != 0 and C >= real(0.0):
                 pull = real(0.0)
-            w = -pull * wp.dot(G[a], X[a] - X[0])
+            w = -wp.float64(pull) * wp.float64(wp.dot(G[a], X[a] - X[0]))
             if wp.isfinite(w):
-                energy_io[i] = energy_io[i] + wp.float64(C * pull / real(wp.static(2.0 * size)))
-                virial_io[i] = virial_io[i] + wp.float64(w)
+                share = wp.float64(wp.static(1.0 / (2.0 * size)))
+                energy_io[i] = energy_io[i] + wp.float64(C) * wp.float64(pull) * share
+                virial_io[i] = virial_io[i] + w
 
     return constraint_measure
 
@@ -103,7 +104,7 @@ def virial_kernel(law: Solved) -> wp.Kernel:
         box: wp.array(dtype=Box),
         t: Tuples,
         b: Bodies,
-        scale: wp.array(dtype=real),
+        scale: wp.array(dtype=wp.float64),
         energy_io: wp.array(dtype=wp.float64),
         virial_io: wp.array(dtype=wp.float64),
     ):
@@ -122,8 +123,9 @@ def virial_kernel(law: Solved) -> wp.Kernel:
             if alpha > wp.float64(0.0) and C != real(0.0):
                 square = wp.float64(C) * wp.float64(C)
                 energy_io[i] = energy_io[i] + square / (alpha * wp.float64(wp.static(2.0 * size)))
-            w = t.lam[r] * scale[0] * wp.dot(G[a], X[a] - X[0])
+            lam = wp.float64(t.lam[r]) * scale[0] * wp.float64(b.unit)
+            w = lam * wp.float64(wp.dot(G[a], X[a] - X[0]))
             if wp.isfinite(w):
-                virial_io[i] = virial_io[i] + wp.float64(w)
+                virial_io[i] = virial_io[i] + w
 
     return constraint_virial

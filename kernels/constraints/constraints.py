@@ -15,8 +15,6 @@ from ..engine.integrate import compensated_sum
 from ..engine.loops import Periodicity, box_type, minimum_image
 from ..precision import APART, Precision, function, function_from_source, register, structure
 
-LARGEST = 1.0e30  # C / |grad C|^2 beyond it, or NaN, comes of a gradient that does not exist
-
 
 @dataclass(frozen=True)
 class Solved:
@@ -42,7 +40,11 @@ class Solved:
 
 
 def bodies_type(precision: Precision) -> Any:
-    """The arrays of the state that constraints read and correct."""
+    """The arrays of the state that constraints read and correct.
+
+    Multipliers are in ``unit``s of mass and times w times ``unit``: their product with a length
+    would leave single precision in planets' or electrons' units.
+    """
     vec3, real = precision.vec3, precision.scalar
     fields = {
         "x": wp.array(dtype=vec3),
@@ -50,6 +52,8 @@ def bodies_type(precision: Precision) -> Any:
         "v": wp.array(dtype=vec3),
         "w": wp.array(dtype=real),
         "correction": wp.array(dtype=vec3),
+        "unit": real,  # of mass, a power of two
+        "most": real,  # C / |grad C|^2 beyond it, or NaN, comes of a gradient that does not exist
     }
     return structure(f"Bodies_{precision.name}", fields)
 
@@ -210,14 +214,14 @@ def project_kernel(law: Solved) -> wp.Kernel:
         s = real(0.0)
         total = real(0.0)
         for a in range(wp.static(size)):
-            w[a] = b.w[ids[a]]
+            w[a] = b.w[ids[a]] * b.unit
             total += w[a]
             if wp.static(unit):
                 s += w[a]
             else:
                 s += w[a] * wp.length_sq(G[a])
         lam = t.lam[r]
-        alpha = q.compliance * inverse_dt * inverse_dt
+        alpha = q.compliance * inverse_dt * inverse_dt * b.unit
         gamma = q.compliance * q.damping * inverse_dt
         way = real(0.0)
         if gamma > real(0.0):
@@ -230,7 +234,7 @@ def project_kernel(law: Solved) -> wp.Kernel:
                 new = real(0.0)
         d_lam = new - lam
         # All pinned, or no gradient (a comparison with NaN is false): nothing sensible to do.
-        if s > real(0.0) and wp.abs(d_lam) * total < real(LARGEST):
+        if s > real(0.0) and wp.abs(d_lam) * total < b.most:
             t.lam[r] = new
             for a in range(wp.static(size)):
                 place(ids[a], x[a], e[a], G[a] * (w[a] * d_lam), b)
@@ -245,7 +249,10 @@ def reset_kernel(precision: Precision) -> wp.Kernel:
 
     @register
     def reset_multipliers(
-        first: int, inverse_dt: real, lam_out: wp.array(dtype=real), scale_out: wp.array(dtype=real)
+        first: int,
+        inverse_dt: wp.float64,
+        lam_out: wp.array(dtype=real),
+        scale_out: wp.array(dtype=wp.float64),
     ):
         r = first + wp.tid()
         lam_out[r] = real(0.0)
@@ -268,7 +275,7 @@ def strain_kernel(law: Solved) -> wp.Kernel:
         box: wp.array(dtype=Box),
         t: Tuples,
         b: Bodies,
-        scale: wp.array(dtype=real),
+        scale: wp.array(dtype=wp.float64),
         force_out: wp.array(dtype=real),
     ):
         r = first + wp.tid()
@@ -276,7 +283,7 @@ def strain_kernel(law: Solved) -> wp.Kernel:
         steepest = real(0.0)
         for a in range(wp.static(size)):
             steepest = wp.max(steepest, wp.length(G[a]))
-        force = wp.abs(t.lam[r]) * steepest * scale[0]
+        force = real(wp.float64(wp.abs(t.lam[r]) * steepest) * scale[0] * wp.float64(b.unit))
         force_out[r] = force
         if may_break != 0 and force > t.item[r].break_force:
             t.broken[r] = 1

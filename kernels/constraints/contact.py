@@ -17,17 +17,19 @@ def contact_types(precision: Precision) -> tuple[Any, Any]:
     data = {
         "x": wp.array(dtype=vec3),
         "radius": wp.array(dtype=real),  # less the slack
-        "share": wp.array(dtype=real),  # w times the ways that normals are split
-        "grip": wp.array(dtype=real),  # w times the ways that friction is split
+        "share": wp.array(dtype=real),  # w unit times the ways that normals are split
+        "grip": wp.array(dtype=real),  # w unit times the ways that friction is split
         "way": wp.array(dtype=vec3),  # of this substep; for bounces the velocity that it began with
         "v": wp.array(dtype=vec3),  # for bounces
-        "virial": wp.array(dtype=real),  # of each particle in this substep, twice its share
-        "inverse_dt_squared": real,
+        "virial": wp.array(dtype=wp.float64),  # of each particle in this substep, twice its share
+        "inverse_dt": real,
+        "unit": real,  # of mass, as of the bodies
     }
     shares = {
         "share": wp.array(dtype=real),
         "grip": wp.array(dtype=real),
         "w": wp.array(dtype=real),
+        "unit": real,
         "relaxation": real,
     }
     return (
@@ -81,11 +83,11 @@ def slack_kernels(precision: Precision, periodic: Periodicity) -> tuple[wp.Kerne
         easing: Easing,
         dt: real,
         slack_io: wp.array(dtype=real),
-        virial_out: wp.array(dtype=real),
+        virial_out: wp.array(dtype=wp.float64),
     ):
         """And the virial of a substep begins."""
         i = pairs.order[first + wp.tid()]
-        virial_out[i] = real(0.0)
+        virial_out[i] = wp.float64(0.0)
         if slack_io[i] > real(0.0):
             slack_io[i] = ease(slack_io[i], radius[i], dt, easing)
 
@@ -171,15 +173,14 @@ def gather_bounce_kernel(precision: Precision, compensated: bool, forces: bool) 
 
 
 @functools.cache
-def share_kernel(precision: Precision) -> wp.Kernel:
+def share_kernel() -> wp.Kernel:
     """Kernel: to each particle its half of the virial of its contacts."""
-    real = precision.scalar
 
     @register
     def share_virial(
-        first: int, twice: wp.array(dtype=real), virial_io: wp.array(dtype=wp.float64)
+        first: int, twice: wp.array(dtype=wp.float64), virial_io: wp.array(dtype=wp.float64)
     ):
         i = first + wp.tid()
-        virial_io[i] = virial_io[i] + wp.float64(0.5) * wp.float64(twice[i])
+        virial_io[i] = virial_io[i] + wp.float64(0.5) * twice[i]
 
     return share_virial

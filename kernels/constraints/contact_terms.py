@@ -129,7 +129,7 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
         n = n * (real(1.0) - turned) + y * (turned / wp.sqrt(wp.where(through, y2, real(1.0))))
         r = wp.where(through, wp.dot(n, x_ij), r)
         share = both(d.share, i, j)
-        soft = share + p.compliance * d.inverse_dt_squared
+        soft = share + p.compliance * d.inverse_dt * d.inverse_dt * d.unit
         active = touching and share > real(0.0)
         lam = wp.where(active, reach - r, real(0.0)) / wp.where(active, soft, real(1.0))
         result = n * lam
@@ -182,7 +182,7 @@ def store_share(precision: Precision, params: Any) -> wp.Function:
     eigenvalue = largest_eigenvalue(precision)
 
     def keep_share(i: int, particle: int, total: six, d: Data, p: params, o: Shares):
-        w = o.w[particle] / o.relaxation
+        w = o.w[particle] * o.unit / o.relaxation
         crowding = eigenvalue(total)
         split = crowding
         if p.friction > real(0.0):
@@ -205,9 +205,11 @@ def store_correction(precision: Precision, params: Any, compensated: bool) -> wp
     def correct(i: int, particle: int, total: four, d: Data, p: params, o: Bodies):
         touched = total[0] != real(0.0) or total[1] != real(0.0) or total[2] != real(0.0)
         if touched:
-            dx = vec3(total[0], total[1], total[2]) * o.w[particle]
+            dx = vec3(total[0], total[1], total[2]) * (o.w[particle] * o.unit)
             place(particle, o.x[particle], kept(particle, o), dx, o)
-            d.virial[particle] = d.virial[particle] + total[3] * d.inverse_dt_squared
+            rate = wp.float64(d.inverse_dt)
+            w = wp.float64(total[3]) * rate * rate * wp.float64(d.unit)
+            d.virial[particle] = d.virial[particle] + w
 
     return function(correct)
 
@@ -219,7 +221,8 @@ def store_impulse(precision: Precision, params: Any) -> wp.Function:
 
     def kick(i: int, particle: int, total: four, d: Data, p: params, o: Bodies):
         impulse = vec3(total[0], total[1], total[2])
-        o.v[particle] = o.v[particle] + impulse * o.w[particle]
-        d.virial[particle] = d.virial[particle] + total[3] * wp.sqrt(d.inverse_dt_squared)
+        o.v[particle] = o.v[particle] + impulse * (o.w[particle] * o.unit)
+        w = wp.float64(total[3]) * wp.float64(d.inverse_dt) * wp.float64(d.unit)
+        d.virial[particle] = d.virial[particle] + w
 
     return function(kick)

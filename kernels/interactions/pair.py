@@ -233,14 +233,14 @@ def sum_store(
 
 
 @functools.cache
-def values_kernel(law: wp.Function, names: tuple[str, ...], params: Any) -> wp.Kernel:
+def values_kernel(law: wp.Function, names: tuple[str, ...], params: Any, returns: Any) -> wp.Kernel:
     """Kernel: a law of double precision at given arguments, those of these names in ``params``."""
     call = ", ".join(f"p.{name}" for name in names)
     source = f"def value(p: Params):\n    return law({call})\n"
     value = function_from_source(source, {"law": law, "Params": params}, after_gradients=True)
 
     @functools.partial(register, cpu_only=True)
-    def values_of_law(given: wp.array(dtype=params), out: wp.array(dtype=wp.float64)):
+    def values_of_law(given: wp.array(dtype=params), out: wp.array(dtype=returns)):
         k = wp.tid()
         out[k] = value(given[k])
 

@@ -188,7 +188,7 @@ class Constraint(ConstraintBase):
             inequality=self.inequality, breakable=self.break_force is not None
         )
         self.bodies = bodies(model, state)
-        self.scale = wp.zeros(1, dtype=model.precision.scalar, device=model.device)
+        self.scale = wp.zeros(1, dtype=wp.float64, device=model.device)
         self.strain = wp.zeros_like(self.struct.lam)
         solved = self.tuples.solved(self, state)
         self.project_kernel = kernels.project_kernel(solved)
@@ -231,6 +231,10 @@ class Constraint(ConstraintBase):
     def limits(self, probe: Probe) -> list[Limit]:
         """None, as XPBD is implicit; how fast it damps is told."""
         return constraint_limits(self, probe)
+
+    def complaint(self) -> str:
+        """That places are too coarse for how far the particles of a tuple are from each other."""
+        return self.tuples.complaint(self.name)
 
     def persistent(self) -> dict[str, wp.array]:
         breakable = self.count and self.break_force is not None

@@ -82,12 +82,15 @@ class Contact(EasedConstraint):
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
         members = model.members([peer.group for peer in self.peers], self.name)
+        self.members = members
         radius, world = model.column("radius")[members], model.world_of[members]
         largest = np.zeros(model.world_count)
         np.maximum.at(largest, world, radius)
         self.count = len(members) if largest.max(initial=0.0) > 0 else 0
         if not self.count:
             return
+        model.squares_fit(self.name, "radius", radius)
+        model.fits(self.name, {"compliance": self._column("compliance")})
         self.pairs = neighbors.request(
             self.name, members, 2.0 * largest, {"position"}, for_constraint=True, half=radius
         )
@@ -95,10 +98,11 @@ class Contact(EasedConstraint):
         self.cutoff = 2.0 * np.where(largest > 0, largest, largest.max())
 
     def complaint(self) -> str:
-        """That nothing can touch, where all are points."""
-        members = self.model.members([peer.group for peer in self.peers], self.name)
+        """That nothing can touch, where all are points, or that places are too coarse for radii."""
+        members = self.members
         if self.count or len(members) < 2:
-            return ""
+            diameter = 2.0 * self.model.column("radius")[members]
+            return self.model.unresolved(self.name, "diameter", diameter, members)
         return (
             f"{self.name}: radius must be above 0 for particles to touch, got 0 for all "
             f"{len(members)}; give add_particles(..., radius=...)."
@@ -111,7 +115,9 @@ class Contact(EasedConstraint):
         """Parameters with which the worlds that are not ``active`` find no pairs."""
         columns = {
             "cutoff_squared": np.where(active, self.cutoff**2, 0.0),
-            "closest_squared": (CLOSEST * self.cutoff) ** 2,
+            "closest_squared": np.maximum(
+                (CLOSEST * self.cutoff) ** 2, np.finfo(self.model.precision.numpy).tiny
+            ),
             **{name: self._column(name) for name in ("friction", "restitution", "compliance")},
         }
         return self.model.parameters("ContactParameters", columns)
@@ -139,13 +145,13 @@ class Contact(EasedConstraint):
         if self.bouncing:
             self.copies["v"] = self.pairs.array(precision.vec3)
         self.Data = Data
-        self.virial = wp.zeros(model.particle_count, dtype=precision.scalar, device=model.device)
+        self.virial = wp.zeros(model.particle_count, dtype=wp.float64, device=model.device)
         self.shares, self.bounce_shares = Shares(), Shares()
         for shares, relaxation in (
             (self.shares, model.settings.relaxation), (self.bounce_shares, 1.0)
         ):  # fmt: skip
             shares.share, shares.w = self.copies["share"], state.inverse_mass
-            shares.relaxation = relaxation
+            shares.unit, shares.relaxation = model.mass_unit, relaxation
         if self.rough:
             self.shares.grip = self.bounce_shares.grip = self.copies["grip"]
         self.everywhere = self._params(np.ones_like(rough))
@@ -217,7 +223,7 @@ class Contact(EasedConstraint):
         data = self.Data()
         for name, array in self.copies.items():
             setattr(data, name, array)
-        data.virial, data.inverse_dt_squared = self.virial, 1.0 / dt**2
+        data.virial, data.inverse_dt, data.unit = self.virial, 1.0 / dt, self.model.mass_unit
         return data
 
     def _sum(self, kernel: wp.Kernel, params: wp.array, data: Any, out: Any) -> None:
@@ -261,8 +267,7 @@ class Contact(EasedConstraint):
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         """Add the virial of the last substep's contacts."""
         if self.count:
-            share = kernels.share_kernel(self.model.precision)
-            launch(share, len(virial), [self.virial, virial], self.model.device)
+            launch(kernels.share_kernel(), len(virial), [self.virial, virial], self.model.device)
 
     def readable(self) -> dict[str, wp.array]:
         return {"virial": self.virial} if self.count else {}

@@ -85,6 +85,10 @@ class ConstraintForce(Interaction):
             inputs = [self.seats, self.model.box, self.struct, self.bodies, state.force]
             launch(self.force_kernel, self.count, inputs, self.model.device)
 
+    def complaint(self) -> str:
+        """That places are too coarse for how far the particles of a tuple are from each other."""
+        return self.tuples.complaint(self.name)
+
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         if self.count:
             inputs = [self.seats, self.model.box, self.struct, self.bodies, energy, virial]

@@ -34,7 +34,7 @@ class Holding(EasedConstraint):
         for w, peer in enumerate(self.peers):
             peer._check(model, w)
         members = model.members([peer.group for peer in self.peers], self.name)
-        self.count = len(members)
+        self.count, self.members = len(members), members
         self.held = kernels.held_type(model.precision, self.sides)()
         self.held.particle = model.array(members, wp.int32)
         self.worlds_held = model.world_of[members]
@@ -44,6 +44,7 @@ class Holding(EasedConstraint):
             for peer in self.peers
         ]
         columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        model.fits(self.name, columns)
         self.Params, self.params = model.parameters(f"{type(self).__name__}Parameters", columns)
         self.rough, self.bouncing = columns["friction"].any(), columns["restitution"].any()
         self.moving = any(peer.moves for peer in self.peers)
@@ -91,6 +92,11 @@ class Holding(EasedConstraint):
         self.held.pose = wp.zeros(
             model.world_count, dtype=pose_type(model.precision), device=model.device
         )
+
+    def complaint(self) -> str:
+        """That places are too coarse for the radii."""
+        diameter = 2.0 * self.model.column("radius")[self.members]
+        return self.model.unresolved(self.name, "diameter", diameter, self.members)
 
     def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
         return self.worlds_held if name == "slack" else super().worlds(name, array)

@@ -15,6 +15,9 @@ from ..engine.state import State
 from ..kernels.constraints.constraint_force import Seats
 from ..kernels.constraints.constraints import Solved, bodies_type, tuples_type
 
+# Of C / |grad C|^2, which for an angle goes with the square of lengths, in a scene of size 1.
+LARGEST = 1e30
+
 
 class Tuples:
     """The tuples of the peers of a constraint, one peer a world.
@@ -43,6 +46,16 @@ class Tuples:
         model.fits(owner, merged)
         self.Item, self.items = model.parameters("ConstraintItem", merged)
         self.model = model
+        steps = [topology.steps(model, w, index) for w, index in enumerate(each)]
+        self.shortest = np.concatenate([d.min(axis=1, initial=np.inf) for d in steps])[self.order]
+        longest = np.concatenate([d.max(axis=1, initial=0.0) for d in steps])[self.order]
+        model.squares_fit(owner, "distances", np.maximum(longest, merged.get("rest_length", 0.0)))
+
+    def complaint(self, owner: str) -> str:
+        """That places are too coarse for how far the particles of a tuple are apart; or nothing."""
+        if self.size < 2:
+            return ""
+        return self.model.unresolved(owner, "distances", self.shortest, self.particles)
 
     def struct(self, *, inequality: bool, breakable: bool) -> Any:
         """The tuples as the kernels take them, with multipliers and, if breakable, marks."""
@@ -87,6 +100,11 @@ class Tuples:
 def bodies(model: Model, state: State) -> Any:
     """The arrays of the state that the kernels of constraints take."""
     result = bodies_type(model.precision)()
+    result.unit = model.mass_unit
+    size = float(model.apart()[0].max(initial=1.0))
+    with np.errstate(over="ignore"):
+        largest = LARGEST * np.square(size)
+    result.most = min(largest, float(np.finfo(model.precision.numpy).max))
     names = {
         "x": "position", "x_error": "position_error", "v": "velocity", "w": "inverse_mass",
         "correction": "correction",

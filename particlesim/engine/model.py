@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,7 +16,10 @@ from ..kernels.self_check import fast_ways
 from ..scene.group import select
 from ..scene.scene import Scene
 from ..scene.settings import Settings
+from . import ranges
 from .start import start_warp
+
+ROOM = 8  # powers of two that a unit keeps from the ends of a precision
 
 
 def choose_device(device: Any) -> Any:
@@ -87,6 +91,7 @@ class Model:
                 "Simulation", "particles", "number below 2^31", self.particle_count, "use fewer"
             )
         self.world_of = np.repeat(np.arange(self.world_count), counts)
+        ranges.step_fits(settings.substep, self.precision.numpy)
         self.periodic = self._periodicity()
         self.box = self._boxes()
         self.attributes = self._attributes()
@@ -136,6 +141,7 @@ class Model:
             1.0, self.box_length, out=np.zeros_like(self.box_length), where=self.box_length > 0
         )
         columns = {"lower": self.box_lower, "length": self.box_length, "inverse": inverse}
+        self.fits("Scene", {"periodic": np.stack([self.box_length, inverse])})
         return self.structures(Box, columns)
 
     def structures(self, kind: Any, columns: dict[str, np.ndarray]) -> wp.array:
@@ -147,23 +153,43 @@ class Model:
         return wp.array(host, dtype=kind, device=self.device)
 
     def fits(self, owner: str, columns: Mapping[str, np.ndarray]) -> None:
-        """Refuse numbers that become infinite in the kernels' precision, masses that become 0, and
-        parameters of which nothing is left; what is little beside others may well be nothing.
+        """Refuse numbers that the kernels' precision cannot hold (see :func:`.ranges.fits`)."""
+        ranges.fits(owner, columns, self.precision.numpy)
+
+    def squares_fit(self, owner: str, name: str, lengths: Any) -> None:
+        """Refuse lengths whose squares the kernels' precision cannot hold."""
+        ranges.squares_fit(owner, name, lengths, self.precision.numpy)
+
+    def unresolved(self, owner: str, name: str, lengths: Any, rows: np.ndarray) -> str:
+        """What is to be said of lengths that start positions are too coarse for, or nothing.
+
+        Args:
+            owner: Whose lengths. name: What they are.
+            lengths: One for all, or (m,) [length].
+            rows: Of the particles that go with them, (m,) or (m, k).
         """
-        kind = self.precision.numpy
-        for name, column in columns.items():
-            given = np.asarray(column, dtype=np.float64)
-            with np.errstate(over="ignore", under="ignore"):
-                kept = given.astype(kind)
-            lost = np.isfinite(given) & ~np.isfinite(kept)
-            if name == "mass" or (name not in ("position", "velocity") and not kept.any()):
-                lost |= (kept == 0) & (given != 0)
-            if lost.any():
-                k = tuple(np.argwhere(lost)[0])
-                raise validate.fail(
-                    owner, name, f"be within {np.dtype(kind)}, about 1e-45 to 3e38",
-                    float(given[k]), "choose other units, or Settings(precision='float64')",
-                )  # fmt: skip
+        if not len(rows):
+            return ""
+        x, _ = self.wrapped(self.column("position"), self.world_of)
+        far = np.abs(x).max(axis=1)[rows.reshape(len(rows), -1)].max(axis=1)
+        lengths = np.broadcast_to(np.asarray(lengths, dtype=np.float64), far.shape)
+        return ranges.unresolved(owner, name, lengths, far, self.precision.numpy)
+
+    @functools.cached_property
+    def mass_unit(self) -> float:
+        """About a particle's mass, a power of two, which no product with it rounds [mass]."""
+        mass = self.column("mass")
+        numbers = np.finfo(self.precision.numpy)
+        power = np.round(np.log2(np.median(mass))) if len(mass) else 0.0
+        return float(2.0 ** np.clip(power, numbers.minexp + ROOM, numbers.maxexp - ROOM))
+
+    def apart(self) -> tuple[np.ndarray, np.ndarray]:
+        """How far the particles of each world are apart along an axis, and about how far each is
+        from the next, both (worlds,) [length]; 0 where they are nowhere apart.
+        """
+        x = [scene.position for scene in self.scenes]
+        size = np.array([float(np.ptp(each, axis=0).max()) if len(each) else 0.0 for each in x])
+        return size, size / np.maximum(np.diff(self.offsets), 1) ** (1.0 / 3.0)
 
     def parameters(self, name: str, columns: dict[str, np.ndarray]) -> tuple[Any, wp.array]:
         """A parameter struct and its array, one entry a world or an item.

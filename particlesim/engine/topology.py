@@ -102,9 +102,11 @@ def rest_lengths(
 
     Raises:
         ValueError: A length of more than half a box: turned along the axis its ends would see each
-            other on the wrong side.
+            other on the wrong side. Lengths whose squares leave the kernels' precision.
     """
-    result = _distances(model, w, pairs) if given is None else given
+    start = steps(model, w, pairs)[:, 0]
+    result = start if given is None else given
+    model.squares_fit(owner, "rest_length", np.maximum(start, result))
     for axis, on in enumerate(model.periodic):
         half = 0.5 * model.box_length[w, axis]
         if on and len(result) and result.max() > half * (1 + 1e-9):
@@ -117,12 +119,12 @@ def rest_lengths(
     return result
 
 
-def _distances(model: Model, w: int, pairs: np.ndarray) -> np.ndarray:
-    scene = model.scenes[w]
-    d = scene.position[pairs[:, 1]] - scene.position[pairs[:, 0]]
+def steps(model: Model, w: int, index: np.ndarray) -> np.ndarray:
+    """Distances at the start from each particle of a tuple to the next, (m, k - 1) [length]."""
+    d = np.diff(model.scenes[w].position[index], axis=1)
     length = model.box_length[w]
     wrapped = np.divide(d, length, out=np.zeros_like(d), where=length > 0)
-    return np.linalg.norm(d - length * np.round(wrapped), axis=1)
+    return np.linalg.norm(d - length * np.round(wrapped), axis=2)
 
 
 def colors(index: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import weakref
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -11,9 +12,11 @@ import numpy as np
 import warp as wp
 
 from ..engine.execution.launch import launch
-from ..engine.loop import Source
+from ..engine.loop import Loop, Source
+from ..engine.model import Model
 from ..engine.report import Report, grid
 from ..kernels.engine.copy import QUANTITIES, block_sums_kernel
+from ..kernels.precision import FLOAT64
 
 SHOWN = 20  # worlds of a table
 BLOCK = 256  # particles summed by one thread
@@ -58,21 +61,51 @@ class Diagnostics(Report):
 def measure(sim: Source, potentials: list[np.ndarray] | None = None) -> Diagnostics:
     """The diagnostics of the present state, which stays as it is.
 
+    Energies that leave single precision, as those of planets in SI units do while their motion is
+    within it, are computed in double.
+
     Args:
         sim: The simulation.
-        potentials: If given, gets the potential energy of each interaction, (worlds,).
+        potentials: An empty list, if given, gets the potential energy of each interaction,
+            (worlds,).
     """
+    found = _measure(sim, sim, potentials)
+    whole = np.isfinite(found.energy).all() and np.isfinite(found.virial).all()
+    if not whole and sim.model.precision is not FLOAT64 and np.isfinite(sim.get("position")).all():
+        if potentials is not None:
+            potentials.clear()
+        found = _measure(sim, _doubled(sim), potentials)
+    return found
+
+
+_doubles: weakref.WeakKeyDictionary[Model, Loop] = weakref.WeakKeyDictionary()
+
+
+def _doubled(sim: Source) -> Loop:
+    """The same scenes in double precision, at the present state."""
+    if sim.model not in _doubles:
+        settings = sim.settings.replace(precision="float64")
+        _doubles[sim.model] = Loop(sim.scenes, settings, sim.model.device)
+    twin = _doubles[sim.model]
+    for name, array in twin.state.arrays.items():
+        if name in sim.state:
+            array.assign(sim.state[name].numpy())
+    return twin
+
+
+def _measure(sim: Source, forces: Source, potentials: list[np.ndarray] | None) -> Diagnostics:
+    """The diagnostics, with the energies of the interactions of ``forces``."""
     model, state, device = sim.model, sim.state, sim.model.device
     energy = wp.zeros(model.particle_count, dtype=wp.float64, device=device)
     virial = wp.zeros_like(energy)
-    with undisturbed(sim):
-        sim.neighbors.update(state)
-        sim.neighbors.grow()
+    with undisturbed(forces):
+        forces.neighbors.update(forces.state)
+        forces.neighbors.grow()
         for constraint in sim.constraints:
             constraint.measure(state, energy, virial)
-        for interaction in sim.interactions:
+        for interaction in forces.interactions:
             before = energy.numpy().copy() if potentials is not None else None
-            interaction.measure(state, energy, virial)
+            interaction.measure(forces.state, energy, virial)
             if potentials is not None:
                 own = energy.numpy() - before
                 potentials.append(np.bincount(model.world_of, own, model.world_count))

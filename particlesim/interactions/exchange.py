@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import warp as wp
 
 from ..engine.model import Model
-from ..kernels.interactions.pair import values_kernel
-from ..kernels.precision import FLOAT64, annotation, structure
 from .arguments import QUANTITIES, Arguments
+from .trial import of_pairs, quantity
 
 PAIRS = 16  # that are tried, beside those of the extremes
 ROUNDING = 1e-6  # relative difference that a sum in another order may leave, by far
@@ -39,7 +37,7 @@ def is_symmetric(
     if len(members) < 2 or not named(arguments):
         return True
     rng = np.random.default_rng(0)
-    columns = {name: _column(model, members, name) for name in sorted(arguments.quantities)}
+    columns = {name: quantity(model, members, name) for name in sorted(arguments.quantities)}
     at = rng.integers(0, len(members), (PAIRS, 2))
     ends = [(each.argmin(), each.argmax()) for each in columns.values() if each.ndim == 1]
     at = np.concatenate([at, *(np.reshape(each, (1, 2)) for each in ends)])
@@ -50,17 +48,10 @@ def is_symmetric(
     off = {name: _off(name, each, rng) for name, each in there.items()}
     pairs = {name: np.concatenate([there[name], off[name]]) for name in columns}
     r = np.tile(r, 2)
-    ours, theirs = (_values(arguments, r, pairs, order) for order in ("ij", "ji"))
+    ours, theirs = (of_pairs(arguments, r, pairs, order) for order in ("ij", "ji"))
     known = np.isfinite(ours) & np.isfinite(theirs)
     ours, theirs = ours[known], theirs[known]
     return bool((np.abs(ours - theirs) <= ROUNDING * (np.abs(ours) + np.abs(theirs))).all())
-
-
-def _column(model: Model, members: np.ndarray, name: str) -> np.ndarray:
-    """A quantity of the members at the start; what is not known before a step is 1."""
-    if name in model.attributes or name in QUANTITIES - {"density"}:
-        return model.column(name)[members]
-    return np.ones(len(members))
 
 
 def _off(name: str, pairs: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -69,26 +60,3 @@ def _off(name: str, pairs: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         return pairs
     factor = rng.uniform(0.5, 2.0, pairs.shape)
     return np.where(pairs == 0.0, factor, pairs * factor)
-
-
-def _values(
-    arguments: Arguments, r: np.ndarray, pairs: dict[str, np.ndarray], order: str
-) -> np.ndarray:
-    """The law at distances r of pairs whose first and second particle are called as ``order``."""
-    law = arguments.law
-    distance = next(iter(law.parameters))
-    kinds = {name: annotation(kind, FLOAT64) for name, kind in law.parameters.items()}
-    kinds = {name: wp.int32 if kind is int else kind for name, kind in kinds.items()}
-    Params = structure("PairValues", kinds)
-    host = np.zeros(len(r), dtype=Params.numpy_dtype())
-    host[distance] = r
-    for name, (kind, source) in zip(arguments.names, arguments.sources, strict=True):
-        if kind == "parameter":
-            host[name] = arguments.values[name]
-        else:
-            host[name] = pairs[source][:, order.index(kind[-1])]
-    kernel = values_kernel(law.function(FLOAT64), tuple(kinds), Params)
-    found = wp.empty(len(r), dtype=wp.float64, device="cpu")
-    given = wp.array(host, dtype=Params, device="cpu")
-    wp.launch(kernel, len(r), [given], [found], device="cpu")
-    return found.numpy()

@@ -100,7 +100,8 @@ def gravity_force(r: float, mass_i: float, mass_j: float, constant: float, softe
 class Gravity(Pair):
     """Newton's gravity between all pairs of a world, u = -G m_i m_j / sqrt(r^2 + s^2).
 
-    Softened after Plummer (1911). Costs the square of the number of particles.
+    Softened after Plummer (1911). Costs the square of the number of particles. In a periodic box it
+    acts between nearest images only, which jump at half the box: a run warns of it.
 
     Args:
         group: Which particles attract each other; None: all.

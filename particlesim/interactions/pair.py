@@ -21,6 +21,7 @@ from ..scene.law import Law
 from ..scene.law import law as make_law
 from ..scene.part import Interaction
 from .arguments import Arguments
+from .consistency import fades
 from .exchange import is_symmetric, named
 from .pair_limits import collisions
 from .pair_loop import PairLoop, check_names, squared_distances
@@ -102,7 +103,7 @@ class Pair(Interaction):
         columns = self.columns(self.parameters)
         model.fits(self.name, columns)
         cutoff = None if self.cutoff is None else np.array([peer.cutoff for peer in self.peers])
-        columns |= squared_distances(model, cutoff)
+        columns |= squared_distances(self.name, model, cutoff)
         columns["cutoff_squared"] *= [peer.acts for peer in self.peers]
         self.Params, self.params = model.parameters("PairParameters", columns)
 
@@ -116,6 +117,18 @@ class Pair(Interaction):
         """Whether i feels of j what j feels of i, as far as tries on some pairs tell."""
         members = np.unique(self.pairs.members_host)
         return all(is_symmetric(each, self.model, members, self.cutoff) for each in self.arguments)
+
+    def complaint(self) -> str:
+        """That places are too coarse for the cutoff, or for how far particles are apart; that a
+        force without a cutoff reaches across half a periodic box.
+        """
+        members = self.pairs.members_host
+        name, lengths = "spacing", self.model.apart()[1]
+        if self.cutoff is not None:
+            cutoff = np.array([peer.cutoff for peer in self.peers])
+            name, lengths = "cutoff or spacing", np.minimum(lengths, cutoff)
+        lengths = lengths[self.model.world_of[members]]
+        return self.model.unresolved(self.name, name, lengths, members) or fades(self)
 
     def fields_of(self, pairs: AllPairs) -> dict[str, wp.array]:
         """What the term reads, in the order of a list's slots."""

@@ -70,24 +70,27 @@ class PairLoop:
         launch(kernel, self.pairs.count, inputs, model.device)
 
 
-def squared_distances(model: Model, cutoff: np.ndarray | None) -> dict[str, np.ndarray]:
+def squared_distances(owner: str, model: Model, cutoff: np.ndarray | None) -> dict[str, np.ndarray]:
     """Parameters that every loop takes: squares of the cutoff and of what counts as coincident.
 
     Args:
+        owner: Whose loop.
+        model: Its worlds.
         cutoff: One a world; None: all pairs.
+
+    Raises:
+        ValueError: Distances whose squares leave the kernels' precision.
     """
     numbers = np.finfo(model.precision.numpy)
     if cutoff is not None:
+        model.squares_fit(owner, "cutoff", cutoff)
         most, closest = cutoff**2, COINCIDENT * cutoff
     else:
-        most, closest = np.full(model.world_count, numbers.max), CLOSEST * _sizes(model)
+        size, spacing = model.apart()
+        model.squares_fit(owner, "position", (size, spacing))
+        most = np.full(model.world_count, numbers.max)
+        closest = CLOSEST * np.where(size > 0, size, 1.0)
     return {"cutoff_squared": most, "closest_squared": np.maximum(closest**2, numbers.tiny)}
-
-
-def _sizes(model: Model) -> np.ndarray:
-    """How far the particles of each world are apart along an axis, (worlds,); 1 where nowhere."""
-    x = [scene.position for scene in model.scenes]
-    return np.array([float(np.ptp(each, axis=0).max()) or 1.0 if len(each) else 1.0 for each in x])
 
 
 def check_names(owner: str, law: Law) -> None:

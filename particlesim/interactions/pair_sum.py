@@ -109,7 +109,7 @@ class PairSum:
         part.requires = part.requires | self.names
         self.pairs = neighbors.of(part, self.names)
         cutoff = None if part.cutoff is None else np.array([each.cutoff for each in part.peers])
-        columns = squared_distances(model, cutoff)
+        columns = squared_distances(self.name, model, cutoff)
         for each in (self.of_pair, self.last):
             columns |= {name: self._column(each, name) for name in each.values}
         model.fits(self.name, {name: columns[name] for name in columns if name not in OWN})

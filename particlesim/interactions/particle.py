@@ -19,6 +19,7 @@ from ..scene.law import Law, law
 from ..scene.law import law as make_law
 from ..scene.part import Interaction
 from .arguments import WIDTHS, Arguments
+from .consistency import belongs
 
 
 class ParticleForce(Interaction):
@@ -42,7 +43,8 @@ class ParticleForce(Interaction):
             time is computed in double precision, where the time keeps its digits.
         group: Which particles feel it; None: all.
         potential: Law of the potential energy, a float, of the same parameters; None: none is
-            reported.
+            reported. With a law that takes neither the velocity nor the time it must be that of
+            the force, f = -dU/dx: else a run warns.
         **parameters: Numbers or 3-vectors for the laws' other parameters.
 
     Raises:
@@ -175,6 +177,10 @@ class ParticleForce(Interaction):
     def _launch(self, kernel: wp.Kernel, *arrays: wp.array) -> None:
         inputs = [self.members, self.world, self.params, self.data, *arrays]
         launch(kernel, self.count, inputs, self.model.device)
+
+    def complaint(self) -> str:
+        """That the potential is not that of the force."""
+        return belongs(self)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         if self.potential is not None:

@@ -57,14 +57,17 @@ class Springs(Interaction):
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
-        pairs = topology.merged(self.name, "pairs", model, [peer.pairs for peer in self.peers])
+        pairs = self.ends = topology.merged(
+            self.name, "pairs", model, [peer.pairs for peer in self.peers]
+        )
         lengths = [
             topology.rest_lengths(self.name, model, w, peer.pairs, peer.rest_length)
             for w, peer in enumerate(self.peers)
         ]
+        self.lengths = np.concatenate(lengths)
         columns = {
             "stiffness": np.concatenate([peer.stiffness for peer in self.peers]),
-            "rest_length": np.concatenate(lengths),
+            "rest_length": self.lengths,
             "damping": np.concatenate([peer.damping for peer in self.peers]),
         }
         model.fits(self.name, columns)
@@ -99,6 +102,10 @@ class Springs(Interaction):
         ]
         most = spring_bound(pairs, columns[0], w), spring_bound(pairs, columns[1], w)
         return probe.response(self, most)
+
+    def complaint(self) -> str:
+        """That places are too coarse for the rest lengths."""
+        return self.model.unresolved(self.name, "rest_length", self.lengths, self.ends)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         if not self.count:

@@ -34,12 +34,14 @@ class Writer:
         host = array.numpy().copy()
         shape = host[rows].shape
         width = shape[1] if len(shape) == 2 else None
-        host[rows] = validate.rows(owner, name, value, shape[0], width)
-        if name == "mass" and not (host[rows] > 0).all():
-            raise validate.fail(owner, "mass", "be above 0", float(host[rows].min()), "give a mass")
-        if name == "inverse_mass" and not (host[rows] >= 0).all():
-            least = float(host[rows].min())
+        given = validate.rows(owner, name, value, shape[0], width)
+        if name == "mass" and not (given > 0).all():
+            raise validate.fail(owner, "mass", "be above 0", float(given.min()), "give a mass")
+        if name == "inverse_mass" and not (given >= 0).all():
+            least = float(given.min())
             raise validate.fail(owner, name, "be at least 0", least, "0 holds a particle")
+        model.fits(owner, {name: given})
+        host[rows] = given
         if name == "radius":
             self._check_radius(owner, host)
         before = None if self.accounts is None else motion(model, state)

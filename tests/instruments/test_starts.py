@@ -53,3 +53,26 @@ def test_contacts_of_points_are_told(radius, device):
     said = told(scene, device)
     assert len(said) == (radius == 0)
     assert not said or "Contact: radius must be above 0" in said[0]
+
+
+def test_smoothing_lengths_below_the_spacing_are_told(device):
+    for h in (0.5, 0.8):
+        scene = block(1.0)
+        scene.interactions[0] = ps.SPH(
+            smoothing_length=h * SPACING, rest_density=1000.0,
+            equation_of_state=ps.Tait(sound_speed=45.0),
+        )  # fmt: skip
+        (said, *_) = told(scene, device)
+        assert "smoothing_length must be above the spacing of the particles" in said
+        assert f"got {h * SPACING:g}, at which each makes" in said
+
+
+@pytest.mark.parametrize(("speed", "words"), [(44.0, 0), (46.0, 1)])
+def test_liquids_faster_than_their_sound_are_told(speed, words, device):
+    # Half of it to either side: what it drifts with as a whole is not counted.
+    scene = block(1.0)
+    x = scene.position
+    scene.column("velocity")[:, 0] = 1000.0 + np.where(x[:, 0] > x[:, 0].mean(), speed, -speed)
+    said = [each for each in told(scene, device) if "sound_speed" in each]
+    assert len(said) == words
+    assert not words or "got 45 with a speed of 46 at the start; give about 4.6e+02" in said[0]

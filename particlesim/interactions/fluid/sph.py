@@ -17,10 +17,11 @@ from ...engine.probe import Probe
 from ...engine.state import State
 from ...kernels.interactions import sph as kernels
 from ...scene.part import Interaction
-from ..pair_loop import PairLoop, squared_distances
+from ..pair_loop import PairLoop
 from .equations_of_state import EquationOfState
 from .limits import fluid_limits
 from .smoothing import SMOOTHING, SUPPORT
+from .starts import complaint
 from .viscosities import Viscosity
 
 # What laws may name beside smoothing_length, rest_density and the parameters of their part.
@@ -30,9 +31,6 @@ VARIABLES = {
     "sound_speed": ("density", "pressure"),
     "term": ("approach", "distance_squared", "density", "sound_speed"),
 }
-# Parts of the rest density between which the median of a start lies that has masses that fit; free
-# surfaces halve it there.
-LEAST_DENSE, MOST_DENSE = 0.4, 1.6
 COINCIDENT = 1e-6  # closer than this, in parts of h, particles count as coincident
 
 
@@ -49,6 +47,9 @@ class SPH(Interaction):
 
     The step is bounded by the time of sound across a smoothing length and by the acceleration
     (Monaghan 1992, on time stepping): dt < 0.4 h / (c (1 + 0.6 alpha)) and dt < 0.25 sqrt(h / |a|).
+
+    A run warns of a start whose masses do not make the rest density at their spacing, whose
+    smoothing length is below the spacing, or which moves faster than a liquid's sound.
 
     State arrays ``density`` and ``pressure`` belong to the positions at which the forces were
     taken last.
@@ -151,9 +152,9 @@ class SPH(Interaction):
         columns["inverse_h"] = 1.0 / h
         with np.errstate(divide="ignore", over="ignore", under="ignore"):
             columns["sigma"] = self.smoothing.sigma / h**self.dimension
-        columns |= squared_distances(model, SUPPORT * h)
-        columns["closest_squared"] = (COINCIDENT * h) ** 2
+        columns |= {"cutoff_squared": (SUPPORT * h) ** 2, "closest_squared": (COINCIDENT * h) ** 2}
         self._check_range(columns)
+        model.fits(self.name, {name: columns[name] for name in self.parameters})
         self.Params, self.params = model.parameters("FluidParameters", columns)
 
     def _check_range(self, columns: dict[str, np.ndarray]) -> None:
@@ -215,24 +216,8 @@ class SPH(Interaction):
         return fluid_limits(self, probe)
 
     def complaint(self) -> str:
-        """That the masses do not make the rest density, where they are far from it."""
-        rest = np.array([peer.parameters.get("rest_density", 0.0) for peer in self.peers])
-        members = self.pairs.members_host
-        rest = rest[self.model.world_of[members]]
-        if not len(members) or not rest.all():
-            return ""
-        kept = [(each, wp.clone(each)) for each in (self.state.density, self.state.pressure)]
-        self.update_density()
-        share = float(np.median(self.state.density.numpy()[members] / rest))
-        for array, before in kept:
-            wp.copy(array, before)
-        if LEAST_DENSE < share < MOST_DENSE:
-            return ""
-        mass = float(np.median(self.model.column("mass")[members]))
-        return (
-            f"{self.name}: mass must make the rest density at the particles' spacing, got "
-            f"{mass:.4g}, which makes {share:.3g} of it; give about {mass / share:.4g}."
-        )
+        """That masses, the smoothing length or the speed of sound do not fit the start."""
+        return complaint(self)
 
     def sound_speeds(self, probe: Probe) -> np.ndarray:
         """Speed of sound at the present densities, of each member [length/time]."""

@@ -1,0 +1,42 @@
+"""Faults and controls: nothing wrong goes by in silence, and what is right is left alone.
+
+A fault ends right, told by a warning that names its part, or refused by such an error. A control
+ends right, and without a word.
+"""
+
+import pytest
+
+from cases.faults import controls, parts, ready, starts, steps
+from cases.faults.judge import REFUSED, RIGHT, TOLD, verdict
+from cases.faults.pending import PENDING
+
+FAULTS = [row for each in (steps, starts, parts) for row in each.rows()]
+CONTROLS = [*ready.rows(), *controls.rows()]
+
+
+def cases(rows):
+    """The rows as parameters of a test, by name."""
+    for row in rows:
+        marks = [pytest.mark.slow] if row.slow else []
+        if row.name in PENDING:
+            marks.append(pytest.mark.xfail(strict=True, reason=PENDING[row.name]))
+        yield pytest.param(row, id=row.name, marks=marks)
+
+
+@pytest.mark.parametrize("row", cases(FAULTS))
+def test_a_fault_does_not_go_by_in_silence(row):
+    found, note = verdict(row)
+    assert found in (RIGHT, TOLD, REFUSED), note
+
+
+@pytest.mark.parametrize("row", cases(CONTROLS))
+def test_what_is_right_is_left_alone(row):
+    found, note = verdict(row)
+    assert found == RIGHT, note
+
+
+def test_the_tables_are_whole():
+    names = [row.name for row in (*FAULTS, *CONTROLS)]
+    assert len(set(names)) == len(names)
+    assert len(FAULTS) >= 110 and len(CONTROLS) >= 67
+    assert PENDING.keys() <= set(names)
