@@ -21,7 +21,7 @@ from ..scene.law import Law
 from ..scene.law import law as make_law
 from ..scene.part import Interaction
 from .arguments import Arguments
-from .consistency import fades
+from .consistency import of_pair_force
 from .exchange import is_symmetric, named
 from .pair_limits import collisions
 from .pair_loop import PairLoop, check_names, squared_distances
@@ -119,8 +119,8 @@ class Pair(Interaction):
         return all(is_symmetric(each, self.model, members, self.cutoff) for each in self.arguments)
 
     def complaint(self) -> str:
-        """That places are too coarse for the cutoff, or for how far particles are apart; that a
-        force without a cutoff reaches across half a periodic box.
+        """That places are too coarse for the cutoff, or for how far particles are apart; that the
+        law does not fit the periodic box, or the precision.
         """
         members = self.pairs.members_host
         name, lengths = "spacing", self.model.apart()[1]
@@ -128,7 +128,7 @@ class Pair(Interaction):
             cutoff = np.array([peer.cutoff for peer in self.peers])
             name, lengths = "cutoff or spacing", np.minimum(lengths, cutoff)
         lengths = lengths[self.model.world_of[members]]
-        return self.model.unresolved(self.name, name, lengths, members) or fades(self)
+        return self.model.unresolved(self.name, name, lengths, members) or of_pair_force(self)
 
     def fields_of(self, pairs: AllPairs) -> dict[str, wp.array]:
         """What the term reads, in the order of a list's slots."""

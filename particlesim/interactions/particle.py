@@ -19,7 +19,7 @@ from ..scene.law import Law, law
 from ..scene.law import law as make_law
 from ..scene.part import Interaction
 from .arguments import WIDTHS, Arguments
-from .consistency import belongs
+from .consistency import of_particle_force
 
 
 class ParticleForce(Interaction):
@@ -179,8 +179,8 @@ class ParticleForce(Interaction):
         launch(kernel, self.count, inputs, self.model.device)
 
     def complaint(self) -> str:
-        """That the potential is not that of the force."""
-        return belongs(self)
+        """That the potential is not that of the force, or that a law leaves the precision."""
+        return of_particle_force(self)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         if self.potential is not None:

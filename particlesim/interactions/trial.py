@@ -1,43 +1,44 @@
-"""Laws asked at chosen arguments, in double precision, apart from any simulation."""
+"""Laws asked at chosen arguments, apart from any simulation."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ..engine.model import Model
 from ..kernels.interactions.pair import values_kernel
-from ..kernels.precision import FLOAT64, annotation, structure
+from ..kernels.precision import FLOAT64, Precision, annotation, structure
 from .arguments import QUANTITIES, Arguments
 
 
 def values(
-    arguments: Arguments, given: Mapping[str, np.ndarray], returns: Any, count: int
-) -> np.ndarray:
-    """A law's values, (k,) or of one that ``returns`` a ``wp.vec3d`` (k, 3).
+    arguments: Arguments, given: Mapping[str, np.ndarray], count: int, *, vector: bool = False,
+    precision: Precision = FLOAT64,
+) -> np.ndarray:  # fmt: skip
+    """A law's values in a precision, (k,) or of a law of vectors (k, 3), as float64.
 
     Args:
         arguments: Of the law.
         given: The law's parameters by name, (k,) or (k, 3); those left out have their own values.
-        returns: What the law is to return.
         count: k.
+        vector: It is a law of vectors.
+        precision: In which it is computed.
     """
     law = arguments.law
-    kinds = {name: annotation(kind, FLOAT64) for name, kind in law.parameters.items()}
+    kinds = {name: annotation(kind, precision) for name, kind in law.parameters.items()}
     kinds = {name: wp.int32 if kind is int else kind for name, kind in kinds.items()}
-    Params = structure("TrialValues", kinds)
+    Params = structure(f"TrialValues_{precision.name}", kinds)
     host = np.zeros(count, dtype=Params.numpy_dtype())
-    for name in kinds:
-        host[name] = given[name] if name in given else arguments.values[name]
-    kernel = values_kernel(law.function(FLOAT64), tuple(kinds), Params, returns)
-    found = wp.empty(len(host), dtype=returns, device="cpu")
-    wp.launch(
-        kernel, len(host), [wp.array(host, dtype=Params, device="cpu")], [found], device="cpu"
-    )
-    return found.numpy()
+    with np.errstate(over="ignore", under="ignore"):
+        for name in kinds:
+            host[name] = given[name] if name in given else arguments.values[name]
+    returns = precision.vec3 if vector else precision.scalar
+    kernel = values_kernel(law.function(precision), tuple(kinds), Params, returns)
+    found = wp.empty(count, dtype=returns, device="cpu")
+    wp.launch(kernel, count, [wp.array(host, dtype=Params, device="cpu")], [found], device="cpu")
+    return found.numpy().astype(np.float64)
 
 
 def quantity(model: Model, rows: np.ndarray, name: str) -> np.ndarray:
@@ -48,8 +49,9 @@ def quantity(model: Model, rows: np.ndarray, name: str) -> np.ndarray:
 
 
 def of_pairs(
-    arguments: Arguments, r: np.ndarray, pairs: Mapping[str, np.ndarray], order: str = "ij"
-) -> np.ndarray:
+    arguments: Arguments, r: np.ndarray, pairs: Mapping[str, np.ndarray], order: str = "ij",
+    precision: Precision = FLOAT64,
+) -> np.ndarray:  # fmt: skip
     """A pair's law at distances r.
 
     Args:
@@ -57,9 +59,32 @@ def of_pairs(
         r: (k,) [length].
         pairs: Quantities of both by name, (k, 2) or (k, 2, 3).
         order: What the first and the second particle are called.
+        precision: In which it is computed.
     """
     given = {next(iter(arguments.law.parameters)): r}
     for name, (kind, source) in zip(arguments.names, arguments.sources, strict=True):
         if kind != "parameter":
             given[name] = pairs[source][:, order.index(kind[-1])]
-    return values(arguments, given, wp.float64, len(r))
+    return values(arguments, given, len(r), precision=precision)
+
+
+def of_particles(
+    arguments: Arguments, model: Model, rows: np.ndarray, x: np.ndarray, *, vector: bool,
+    precision: Precision = FLOAT64,
+) -> np.ndarray:  # fmt: skip
+    """A particle's law as these particles would feel it at x, at the start.
+
+    Args:
+        arguments: Of the law.
+        model: With the particles.
+        rows: Which, (k,).
+        x: Where, (k, 3) [length].
+        vector: It is a law of vectors.
+        precision: In which it is computed.
+    """
+    given = {
+        name: x if source == "position" else quantity(model, rows, source)
+        for name, (kind, source) in zip(arguments.names, arguments.sources, strict=True)
+        if kind != "parameter"
+    }
+    return values(arguments, given, len(rows), vector=vector, precision=precision)

@@ -91,3 +91,50 @@ def test_a_force_fades_within_half_a_periodic_box(part, left):
     if left is not None:
         assert f"got {left:.2g} of the force at 2.5 left at 5;" in said[0]
     assert told(part()) == []
+
+
+@ps.law
+def of_products(r: float, mass_i: float, mass_j: float, strength: float):
+    return -strength * mass_i * mass_j / (mass_i + mass_j) / (r * r)
+
+
+@ps.law
+def in_order(r: float, mass_i: float, mass_j: float, strength: float):
+    return -strength * mass_i * (mass_j / (mass_i + mass_j)) / (r * r)
+
+
+@ps.law
+def lift(position: wp.vec3, mass: float, rate: float):
+    return mass * mass * rate * (rate / mass) * position
+
+
+@pytest.mark.parametrize(
+    ("law", "mass", "precision", "left"),
+    [
+        # 6.6e-26^2 is 0 in single precision, (2e30)^2 is infinite; the force is neither.
+        (of_products, 6.6e-26, "float32", "0"),
+        (of_products, 2e30, "float32", "-inf"),
+        (of_products, 6.6e-26, "float64", None),
+        (in_order, 6.6e-26, "float32", None),
+        (in_order, 2e30, "float32", None),
+        (of_products, 1.0, "float32", None),
+        (lift, 6.6e-26, "float32", "0"),
+        (lift, 1.0, "float32", None),
+    ],
+)
+def test_products_of_a_law_are_held_against_the_precision(law, mass, precision, left):
+    scene = ps.Scene()
+    scene.add_particles([(1, 1, 1), (2, 0, 0), (0, 2, 1)], mass=mass, pinned=True)
+    scene.add_interaction(
+        ps.ParticleForce(law, rate=1.0)
+        if law is lift
+        else ps.PairForce(law, cutoff=None, strength=1e-3)
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        ps.Simulation(scene, ps.Settings(precision=precision), device="cpu").run(0)
+    said = [str(each.message) for each in caught]
+    assert len(said) == (left is not None), said
+    if left is not None:
+        assert f"law {law.name} must stay within float32, products of it too, got" in said[0]
+        assert f"got {left} for " in said[0].replace("got -0 ", "got 0 ")
