@@ -20,6 +20,7 @@ from ..scene.law import law as make_law
 from ..scene.part import Interaction
 from .arguments import WIDTHS, Arguments
 from .consistency import of_particle_force
+from .pulses import unseen
 
 
 class ParticleForce(Interaction):
@@ -179,8 +180,10 @@ class ParticleForce(Interaction):
         launch(kernel, self.count, inputs, self.model.device)
 
     def complaint(self) -> str:
-        """That the potential is not that of the force, or that a law leaves the precision."""
-        return of_particle_force(self)
+        """That the potential is not that of the force, that a law leaves the precision, or that it
+        is large between substeps only.
+        """
+        return of_particle_force(self) or (unseen(self) if _timed(self.arguments[0]) else "")
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         if self.potential is not None:
