@@ -70,7 +70,7 @@ class Simulation(Reading):
             self.accounts = Accounts(self.loop)
             self.loop.observers.all.append(self.accounts)
         self.watchdog = Watchdog(self.loop.model, self.loop.neighbors)
-        self.rounds = Rounds(self.loop)
+        self.rounds = Rounds(self.loop, self.watchdog.limits)
         self.frames = Frames(self.loop, self.watchdog)
         self.writer = Writer(self.frames, self.watchdog, self.rounds, self.accounts)
 
@@ -112,8 +112,11 @@ class Simulation(Reading):
     def _look(self, first: bool = False) -> None:
         """Make a round of what is looked at now and then; ``first``: before anything has moved."""
         rounds = self.rounds
-        if self.settings.watchdog and (rounds.made < 0 if first else rounds.due()):
+        if not self.settings.watchdog:
+            return
+        if rounds.made < 0 if first else rounds.due() or self.watchdog.hurried:
             rounds.make()
+            self.watchdog.forget()
 
     def run(
         self,

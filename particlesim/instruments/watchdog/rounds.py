@@ -12,7 +12,7 @@ to compare with yet, and one that does not fit its constraints eases.
 
 A round takes as long as some hundred substeps of a small scene. It is made after 1, 2, 4, 8 ...
 frames, and from then on so seldom that it is under 2 % of the time, by a rule of the scene alone;
-nothing of the motion depends on it.
+and whenever something has become half as fast again. Nothing of the motion depends on it.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+import warp as wp
 
 from ...constraints.boundary import Boundary
 from ...constraints.constraint import Constraint
@@ -31,13 +32,13 @@ from ..diagnostics import measure, undisturbed
 from ..residuals import off, residuals
 from ..stability import warn_if_past
 from .incident import SimulationWarning
+from .limits import GROWN, Limits
 
 DRIFT = 0.1  # of the largest kinetic energy
 UNMET = 0.02  # of a tuple's extent
 DEEP = 0.2  # of a radius
-GROWN = 1.5  # times as fast, or as strong: the limits are asked again
 SHARE = 50  # times its own cost, from one round to the next
-ROUND = 4e5  # what a round costs beside three evaluations of the forces, in pairs of these
+ROUND = 6e6  # what a round costs beside three evaluations of the forces, in pairs of these
 SUBSTEP = 2e3  # and a substep beside one
 
 
@@ -46,10 +47,11 @@ class Rounds:
 
     Args:
         loop: What is in motion.
+        limits: Of its speeds, by which the watchdog calls for a round.
     """
 
-    def __init__(self, loop: Loop):
-        self.loop = loop
+    def __init__(self, loop: Loop, limits: Limits):
+        self.loop, self.limits = loop, limits
         self.made, self.next = -1, 0  # frames
         self.kept = conserves(loop)
         worlds = loop.model.world_count
@@ -83,13 +85,15 @@ class Rounds:
 
     def _limits(self) -> None:
         """Asked again where the motion has become faster, or stronger; at the start by the run."""
-        state = self.loop.state
-        sizes = np.array([_largest(state.velocity), 0.0])
+        state, model = self.loop.state, self.loop.model
+        speeds = np.zeros(model.world_count)
+        np.maximum.at(speeds, model.world_of, _lengths(state.velocity))
+        sizes = np.array([speeds.max(initial=0.0), 0.0])
         if "force" in state:
-            sizes[1] = _largest(state.force, state.inverse_mass.numpy())
+            sizes[1] = (_lengths(state.force) * state.inverse_mass.numpy()).max(initial=0.0)
+        self.limits.meet(speeds)
         grown = (sizes > GROWN * self.met).any()
-        if grown or self.made > self.loop.frame:
-            self.met = np.maximum(self.met, sizes)
+        self.met = np.maximum(self.met, sizes)
         if grown and self.loop.frame:
             warn_if_past(self.loop, again=True)
 
@@ -140,10 +144,9 @@ class Rounds:
         )  # fmt: skip
 
 
-def _largest(array: Any, factor: Any = 1.0) -> float:
-    """The largest length of a vector."""
-    sizes = np.linalg.norm(array.numpy().astype(np.float64), axis=1) * factor
-    return float(sizes.max(initial=0.0))
+def _lengths(array: wp.array) -> np.ndarray:
+    """Lengths of vectors, (n,)."""
+    return np.linalg.norm(array.numpy().astype(np.float64), axis=1)
 
 
 def conserves(loop: Loop) -> bool:
