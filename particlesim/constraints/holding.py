@@ -95,8 +95,7 @@ class Holding(EasedConstraint):
 
     def complaint(self) -> str:
         """That places are too coarse for the radii."""
-        diameter = 2.0 * self.model.column("radius")[self.members]
-        return self.model.unresolved(self.name, "diameter", diameter, self.members)
+        return self.model.unresolved_radii(self.name, self.members)
 
     def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
         return self.worlds_held if name == "slack" else super().worlds(name, array)

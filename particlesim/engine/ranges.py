@@ -17,7 +17,9 @@ REMEDY = "choose other units, or Settings(precision='float64')"
 # Lengths that lie so many times within the roots of the smallest and the largest normal number have
 # squares with all their digits, and so have sums of a few of them.
 ROOM = 4.0
-COARSE = 1.0 / 64.0  # of a length: what neighbouring numbers may be apart unasked
+# What neighbouring numbers may be apart unasked, in parts of a length; of a diameter, as contacts
+# see places with what rounding has kept from them: only the start is rounded.
+COARSE, COARSE_DIAMETER = 1.0 / 64.0, 1.0 / 5.0
 
 
 def fits(owner: str, columns: Mapping[str, np.ndarray], kind: Any) -> None:
@@ -78,20 +80,22 @@ def step_fits(step: float, kind: Any) -> None:
         )
 
 
-def unresolved(owner: str, name: str, lengths: np.ndarray, x: np.ndarray, kind: Any) -> str:
+def unresolved(
+    owner: str, name: str, lengths: np.ndarray, x: np.ndarray, kind: Any, part: float
+) -> str:
     """What is to be said of lengths that places are too far from the origin for; empty if nothing.
 
-    Near x numbers are ``spacing(x)`` apart, and places are rounded to them. Said where that is more
-    than a 64th of a length.
+    Near x numbers are ``spacing(x)`` apart, and places are rounded to them.
 
     Args:
         owner: Whose lengths. name: What they are.
         lengths: (m,) [length]; 0 says nothing.
         x: (m,) the largest coordinates that go with them [length].
         kind: The precision's number.
+        part: Of a length, what numbers may be apart unasked.
     """
     apart = np.spacing(np.abs(x).astype(kind)).astype(np.float64)
-    coarse = (lengths > 0) & (apart > COARSE * lengths)
+    coarse = (lengths > 0) & (apart > part * lengths)
     if not coarse.any():
         return ""
     k = int(np.argmax(np.where(coarse, apart / np.where(coarse, lengths, 1.0), 0.0)))

@@ -82,7 +82,7 @@ def test_places_too_far_from_the_origin_are_told(part, told):
 
     def run(far, **knobs):
         scene = ps.Scene()
-        scene.add_particles([(far, 0, 0), (far + 1.2, 0, 0)], radius=0.3)
+        scene.add_particles([(far, 0, 0), (far + 1.2, 0, 0)], radius=0.1)
         made = part()
         (scene.add_constraint if hasattr(made, "project") else scene.add_interaction)(made)
         ps.Simulation(scene, ps.Settings(dt=1e-4, **knobs), device="cpu").run(1)
