@@ -45,6 +45,8 @@ class Holding(EasedConstraint):
         ]
         columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         model.fits(self.name, columns)
+        radii = model.column("radius")[members]
+        model.squares_fit(self.name, "radius", np.concatenate([radii, model.apart()[0]]))
         self.Params, self.params = model.parameters(f"{type(self).__name__}Parameters", columns)
         self.rough, self.bouncing = columns["friction"].any(), columns["restitution"].any()
         self.moving = any(peer.moves for peer in self.peers)

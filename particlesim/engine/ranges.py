@@ -23,25 +23,24 @@ COARSE, COARSE_DIAMETER = 1.0 / 64.0, 1.0 / 5.0
 
 
 def fits(owner: str, columns: Mapping[str, np.ndarray], kind: Any) -> None:
-    """Refuse numbers that become infinite in a precision, masses that become 0, and parameters of
-    which nothing is left; what is little beside others may well be nothing.
+    """Refuse numbers that become infinite in a precision, masses of which nothing is left, and
+    parameters of all of which but few digits are; what is little beside others may well be nothing.
     """
+    numbers = np.finfo(kind)
     for name, column in columns.items():
         given = np.asarray(column, dtype=np.float64)
         with np.errstate(over="ignore", under="ignore"):
             kept = given.astype(kind)
         lost = np.isfinite(given) & ~np.isfinite(kept)
-        if name == "mass" or (name not in ("position", "velocity") and not kept.any()):
-            lost |= (kept == 0) & (given != 0)
+        if name not in ("position", "velocity", "mass"):
+            lost |= (given != 0) & (np.abs(kept).max(initial=0.0) < numbers.tiny)
         if name == "mass":
-            with np.errstate(over="ignore", divide="ignore"):
+            with np.errstate(over="ignore", divide="ignore"):  # the inverse of 0, too
                 lost |= ~np.isfinite((1.0 / given).astype(kind))
         if lost.any():
-            numbers = np.finfo(kind)
             raise validate.fail(
                 owner, name,
-                f"be within {np.dtype(kind)}, about {numbers.smallest_subnormal:.0e} to "
-                f"{numbers.max:.0e}",
+                f"be within {np.dtype(kind)}, about {numbers.tiny:.0e} to {numbers.max:.0e}",
                 float(given[tuple(np.argwhere(lost)[0])]), REMEDY,
             )  # fmt: skip
 

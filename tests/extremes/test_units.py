@@ -16,7 +16,7 @@ from cases.scales import PARTS, PLAIN, UNITS, law_of_powers, motion
 # take over the way of a substep (see cases.scales).
 CLOSE = {"float32": 1e-5, "float64": 1e-11}
 # What says by which part and quantity a scene leaves single precision, and what to do.
-REFUSED = r"\w[\w.]*: \w+ must .*float32.*, got .*; choose (other units|another unit).*float64.*\."
+REFUSED = r"\w[\w.]*: [\w/^]+ must .*float32.*, got .*; choose (other|another) unit.*float64.*\."
 
 
 @functools.cache
