@@ -37,4 +37,25 @@ PENDING = {
     "a soft rope damped by 1000": UNMET,
     "a soft rope damped by 1e+06": UNMET,
     "a bullet that passes a ball later on": AHEAD,
+    # Steps that are chosen automatically.
+    **{
+        f"{scene}, {way} automatic{more}": why
+        for scene, why, ways in (
+            ("atoms at rest at 1.3, Euler", AHEAD, ("substeps",)),
+            ("Morse, at rest at 1.8, Euler", AHEAD, ("substeps",)),
+            ("Morse, at rest at 1.8, Verlet", AHEAD, ("substeps",)),
+            ("attracting Yukawa, Euler", AHEAD, ("substeps",)),
+            ("attracting Yukawa, Verlet", AHEAD, ("substeps",)),
+            ("a comet of e = 0.6, Euler", AHEAD, ("dt 1", "dt 10")),
+            ("a comet of e = 0.6, Verlet", AHEAD, ("dt 1", "dt 10")),
+            ("a comet of e = 0.95, Euler", AHEAD, ("substeps", "dt 1", "dt 10")),
+            ("a comet of e = 0.95, Verlet", AHEAD, ("substeps", "dt 1", "dt 10")),
+            ("a comet of e = 0.9 by a law, Euler", AHEAD, ("substeps", "dt 1", "dt 10")),
+            ("a comet of e = 0.9 by a law, Verlet", AHEAD, ("substeps", "dt 1")),
+            ("a magnetic field, Euler", TURNING, ("substeps", "dt 1")),
+            ("a magnetic field, Verlet", TURNING, ("substeps", "dt 1")),
+        )
+        for each in ways
+        for way, more in [(each.split()[0], f", {each.split()[1]} substeps" if " " in each else "")]
+    },
 }
