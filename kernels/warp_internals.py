@@ -111,9 +111,9 @@ def source_lines(function: wp.Function) -> tuple[list[str], int]:
     return function.adj.source_lines, (function.adj.lineno or 0) + 1
 
 
-def argument_names(function: wp.Function) -> tuple[str, ...]:
-    """Names of a function's arguments. Rests on: ``Function.input_types``."""
-    return tuple(function.input_types)
+def arguments(function: wp.Function) -> dict[str, Any]:
+    """Types of a function's arguments by name. Rests on: ``Function.input_types``."""
+    return dict(function.input_types)
 
 
 def compiled(source: str, name: str, scope: dict[str, Any]) -> Callable[..., Any]:

@@ -91,9 +91,11 @@ def measure_kernel(law: Solved) -> wp.Kernel:
 
 @functools.cache
 def virial_kernel(law: Solved) -> wp.Kernel:
-    """Kernel: virial lam / dt^2 sum_a grad_a C . x_a of multipliers, to each particle its share."""
-    _real, Box, Tuples, Bodies = law.types
-    view = view_function(law)
+    """Kernel: virial lam / dt^2 sum_a grad_a C . x_a of multipliers, and energy C^2 / (2 alpha) of
+    compliant tuples, to each particle its share.
+    """
+    real, Box, Tuples, Bodies = law.types
+    size, view = law.size, view_function(law)
 
     @register
     def constraint_virial(
@@ -103,6 +105,7 @@ def virial_kernel(law: Solved) -> wp.Kernel:
         t: Tuples,
         b: Bodies,
         scale: wp.array(dtype=wp.float64),
+        energy_io: wp.array(dtype=wp.float64),
         virial_io: wp.array(dtype=wp.float64),
     ):
         k = first + wp.tid()
@@ -110,7 +113,16 @@ def virial_kernel(law: Solved) -> wp.Kernel:
         for n in range(seats.begin[k], seats.begin[k + 1]):
             r = seats.tuple[n]
             a = seats.seat[n]
-            _x, _e, X, _C, G = view(r, box, t, b)
+            _x, _e, X, C, G = view(r, box, t, b)
+            if t.one_sided != 0:
+                C = wp.min(C, real(0.0))
+            if t.breakable != 0:
+                if t.broken[r] != 0:
+                    C = real(0.0)
+            alpha = wp.float64(t.item[r].compliance)
+            if alpha > wp.float64(0.0) and C != real(0.0):
+                square = wp.float64(C) * wp.float64(C)
+                energy_io[i] = energy_io[i] + square / (alpha * wp.float64(wp.static(2.0 * size)))
             lam = wp.float64(t.lam[r]) * scale[0] * wp.float64(b.unit)
             w = lam * wp.float64(wp.dot(G[a], X[a] - X[0]))
             if wp.isfinite(w):

@@ -18,6 +18,7 @@ def motion_type(precision: Precision) -> Any:
         "v": wp.array(dtype=vec3),
         "w": wp.array(dtype=real),
         "f": wp.array(dtype=vec3),
+        "f_previous": wp.array(dtype=vec3),
         "x_error": wp.array(dtype=vec3),
         "v_error": wp.array(dtype=vec3),
         "x_previous": wp.array(dtype=vec3),
@@ -46,22 +47,31 @@ def compensated_sum(precision: Precision) -> wp.Function:
 
 def motion_functions(
     precision: Precision, forces: bool, compensated: bool
-) -> tuple[wp.Function, wp.Function]:
-    """``kick(i, dt, m) -> v``: v += w f dt; and ``move(i, dx, m)``: x += dx."""
+) -> tuple[wp.Function, wp.Function, wp.Function]:
+    """``change(i, f, dt, m) -> v``: v += w f dt; ``kick(i, dt, m) -> v``: by the present force, if
+    there are any; and ``move(i, dx, m)``: x += dx.
+    """
     vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
     add = compensated_sum(precision)
 
-    def kick(i: int, dt: real, m: Motion):
+    def change(i: int, f: vec3, dt: real, m: Motion):
         v = m.v[i]
-        if wp.static(forces):
-            dv = m.f[i] * (m.w[i] * dt)
-            if wp.static(compensated):
-                v, error = add(v, dv, m.v_error[i])
-                m.v_error[i] = error
-            else:
-                v = v + dv
-            m.v[i] = v
+        dv = f * (m.w[i] * dt)
+        if wp.static(compensated):
+            v, error = add(v, dv, m.v_error[i])
+            m.v_error[i] = error
+        else:
+            v = v + dv
+        m.v[i] = v
         return v
+
+    change = function(change)
+
+    def kick(i: int, dt: real, m: Motion):
+        if wp.static(not forces):
+            return m.v[i]
+        else:
+            return change(i, m.f[i], dt, m)
 
     def move_by(i: int, dx: vec3, m: Motion):
         x = m.x[i]
@@ -72,7 +82,7 @@ def motion_functions(
             x = x + dx
         m.x[i] = x
 
-    return function(kick), function(move_by)
+    return change, function(kick), function(move_by)
 
 
 def wrap_function(
@@ -133,7 +143,7 @@ def integration_kernels(
     remember: keep the positions at the start of the substep.
     """
     vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
-    kick, move = motion_functions(precision, forces, compensated)
+    change, kick, move = motion_functions(precision, forces, compensated)
     wrap = wrap_function(move, precision, compensated, remember)
     wraps = bool(periodic)
 
@@ -156,6 +166,12 @@ def integration_kernels(
         kick(first + wp.tid(), dt, m)
 
     @register
+    def correct(first: int, dt: real, m: Motion):
+        """v += w (f - f_previous) dt: the kick that foresaw the forces has the present ones."""
+        i = first + wp.tid()
+        change(i, m.f[i] - m.f_previous[i], dt, m)
+
+    @register
     def follow_corrections(first: int, inverse_dt: real, m: Motion):
         """v += correction / dt: the velocity follows the projection."""
         i = first + wp.tid()
@@ -164,8 +180,61 @@ def integration_kernels(
             wrap(i, m)
 
     return SimpleNamespace(
-        advance=advance, kick_only=kick_only, follow_corrections=follow_corrections
-    )
+        advance=advance, kick_only=kick_only, correct=correct,
+        follow_corrections=follow_corrections,
+    )  # fmt: skip
+
+
+@functools.cache
+def implicit_kernels(precision: Precision, predicted: bool) -> SimpleNamespace:
+    """The kernels of forces that are implicit in the velocity.
+
+    predicted: v has had a kick of f_previous dt already.
+    """
+    vec3, real, mat33, Motion = (
+        precision.vec3, precision.scalar, precision.mat33, motion_type(precision)
+    )  # fmt: skip
+
+    @register
+    def lead(
+        first: int,
+        dt: wp.float64,
+        m: Motion,
+        slope: wp.array(dtype=mat33),
+        lead_out: wp.array(dtype=vec3),
+    ):
+        """u = (1 - w (df/dv) dt)^-1 w f dt, by which v + u = v + w f(v + u) dt to first order.
+
+        In double precision, as a determinant is a product of three.
+        """
+        i = first + wp.tid()
+        f = m.f[i]
+        if wp.static(predicted):
+            f = f - m.f_previous[i]
+        a = wp.float64(m.w[i]) * dt
+        J = slope[i]
+        A = wp.identity(n=3, dtype=wp.float64)
+        for r in range(3):
+            for c in range(3):
+                A[r, c] -= a * wp.float64(J[r, c])
+        u = wp.inverse(A) * wp.vec3d(wp.float64(f[0]), wp.float64(f[1]), wp.float64(f[2])) * a
+        lead_out[i] = vec3(real(u[0]), real(u[1]), real(u[2]))
+
+    @register
+    def settle(first: int, dt: wp.float64, m: Motion, lead: wp.array(dtype=vec3)):
+        """f = u / (w dt). Not f + (df/dv) u, of which nothing may be left but rounding."""
+        i = first + wp.tid()
+        a = wp.float64(m.w[i]) * dt
+        if a > wp.float64(0.0):
+            u = lead[i]
+            f = vec3(
+                real(wp.float64(u[0]) / a), real(wp.float64(u[1]) / a), real(wp.float64(u[2]) / a)
+            )
+            if wp.static(predicted):
+                f = f + m.f_previous[i]
+            m.f[i] = f
+
+    return SimpleNamespace(lead=lead, settle=settle)
 
 
 @functools.cache

@@ -37,6 +37,49 @@ def tuples_kernel(law: Solved) -> wp.Kernel:
 
 
 @functools.cache
+def off_kernel(law: Solved) -> wp.Kernel:
+    """Kernel: |C + alpha (F + beta dC/dt)| / |grad C| of each tuple, in parts of its extent.
+
+    F = lam / dt^2 is the force of its multiplier: what it is off by where it should give way, too.
+    """
+    real, Box, Tuples, Bodies = law.types
+    size, view = law.size, view_function(law)
+
+    @register
+    def measure_off(
+        first: int,
+        box: wp.array(dtype=Box),
+        t: Tuples,
+        b: Bodies,
+        scale: wp.array(dtype=wp.float64),
+        off_out: wp.array(dtype=real),
+    ):
+        r = first + wp.tid()
+        _x, _e, X, C, G = view(r, box, t, b)
+        q = t.item[r]
+        extent = real(0.0)
+        slope = real(0.0)
+        rate = real(0.0)
+        for a in range(wp.static(size)):
+            extent = wp.max(extent, wp.length(X[a] - X[0]))
+            slope = slope + wp.length_sq(G[a])
+            rate = rate + wp.dot(G[a], b.v[t.particle[r][a]])
+        F = wp.float64(t.lam[r]) * scale[0] * wp.float64(b.unit)
+        give = wp.float64(q.compliance) * (F + wp.float64(q.damping) * wp.float64(rate))
+        miss = wp.abs(wp.float64(C) + give)
+        if t.one_sided != 0 and C >= real(0.0):
+            miss = wp.float64(0.0)
+        if t.breakable != 0:
+            if t.broken[r] != 0:
+                miss = wp.float64(0.0)
+        if miss > wp.float64(0.0):
+            miss = miss / wp.float64(wp.sqrt(slope) * extent)
+        off_out[r] = real(miss)
+
+    return measure_off
+
+
+@functools.cache
 def boundary_kernel(form: Form) -> wp.Kernel:
     """Kernel: how deep each particle is inside of a boundary, on its worst side."""
     _, sides, precision, params, compensated, _ = form

@@ -10,22 +10,26 @@ from ..warp_internals import elements
 
 
 def _plain(precision: Precision) -> wp.Function:
-    """``within(a, b, low, high, fast, x, v)``: the particles a to b - 1 are within the limits."""
+    """``outside(a, b, low, high, fast, quick, x, v)``: of the particles a to b - 1, 1 if one is not
+    within the limits, plus 2 if one is quick.
+    """
     vec3, real = precision.vec3, precision.scalar
 
-    def within(
-        a: int, b: int, low: vec3, high: vec3, fast: real, x: wp.array(dtype=vec3),
+    def outside(
+        a: int, b: int, low: vec3, high: vec3, fast: real, quick: real, x: wp.array(dtype=vec3),
         v: wp.array(dtype=vec3),
     ):  # fmt: skip
         good = bool(True)
+        slow = bool(True)
         for i in range(a, b):
             x_i = x[i]
             v_i = v[i]
             for k in range(3):
                 good = good and x_i[k] >= low[k] and x_i[k] <= high[k] and wp.abs(v_i[k]) <= fast
-        return good
+                slow = slow and wp.abs(v_i[k]) <= quick
+        return wp.where(good, 0, 1) + wp.where(slow, 0, 2)
 
-    return function(within)
+    return function(outside)
 
 
 def _vectorised(precision: Precision) -> wp.Function:
@@ -33,38 +37,40 @@ def _vectorised(precision: Precision) -> wp.Function:
     vec3, real, c = precision.vec3, precision.scalar, precision.c
     axes = "\n".join(
         f"        bad |= !(x_[3 * i + {k}] >= l{k}) | !(x_[3 * i + {k}] <= h{k}) | "
-        f"!(v_[3 * i + {k}] <= fast) | !(v_[3 * i + {k}] >= -fast);"
+        f"!(v_[3 * i + {k}] <= fast) | !(v_[3 * i + {k}] >= -fast);\n"
+        f"        hurried |= !(v_[3 * i + {k}] <= quick) | !(v_[3 * i + {k}] >= -quick);"
         for k in range(3)
     )
     snippet = f"""
     const {c}* x_ = {elements("x", c)};
     const {c}* v_ = {elements("v", c)};
     const {c} l0 = low[0], l1 = low[1], l2 = low[2], h0 = high[0], h1 = high[1], h2 = high[2];
-    int bad = 0;
+    int bad = 0, hurried = 0;
 #pragma clang loop vectorize(enable)
     for (int i = a; i < b; ++i) {{
 {axes}
     }}
-    return !bad;
+    return bad + 2 * hurried;
 """
 
-    def within(
-        a: int, b: int, low: vec3, high: vec3, fast: real, x: wp.array(dtype=vec3),
+    def outside(
+        a: int, b: int, low: vec3, high: vec3, fast: real, quick: real, x: wp.array(dtype=vec3),
         v: wp.array(dtype=vec3),
-    ) -> wp.bool: ...  # fmt: skip
+    ) -> int: ...  # fmt: skip
 
-    return native(within, snippet, after_gradients=False)
+    return native(outside, snippet, after_gradients=False)
 
 
 @functools.cache
 def check_kernel(precision: Precision, vectorised: bool) -> wp.Kernel:
-    """Kernel: raise a flag if a particle is not within the limits of its world.
+    """Kernel: raise the first flag if a particle is not within the limits of its world.
 
     lower_a <= x_a <= upper_a and |v_a| <= speed on every axis a. The limits are finite, so that
-    infinities fail them too, as NaN fails every comparison. One thread looks at one block.
+    infinities fail them too, as NaN fails every comparison. The second flag: |v_a| > quick, which
+    is nothing wrong. One thread looks at one block.
     """
     vec3, real = precision.vec3, precision.scalar
-    within = (_vectorised if vectorised else _plain)(precision)
+    outside = (_vectorised if vectorised else _plain)(precision)
 
     @functools.partial(register, cpu_only=vectorised)
     def check_limits(
@@ -75,14 +81,18 @@ def check_kernel(precision: Precision, vectorised: bool) -> wp.Kernel:
         lower: wp.array(dtype=vec3),
         upper: wp.array(dtype=vec3),
         speed: wp.array(dtype=real),
+        quick: wp.array(dtype=real),
         x: wp.array(dtype=vec3),
         v: wp.array(dtype=vec3),
         flag: wp.array(dtype=wp.int32),
     ):
         b = first + wp.tid()
         w = world[b]
-        if not within(begin[b], end[b], lower[w], upper[w], speed[w], x, v):
+        found = outside(begin[b], end[b], lower[w], upper[w], speed[w], quick[w], x, v)
+        if found == 1 or found == 3:
             flag[0] = 1  # every writer writes the same
+        if found >= 2:
+            flag[1] = 1
 
     return check_limits
 

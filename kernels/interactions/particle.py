@@ -6,7 +6,8 @@ from typing import Any
 import warp as wp
 
 from ..engine.loops import box_type
-from ..precision import Precision, function_from_source, register
+from ..precision import FLOAT32, FLOAT64, Precision, function, function_from_source, register
+from ..warp_internals import arguments as arguments_of
 
 
 def _evaluation(
@@ -30,6 +31,96 @@ def _evaluation(
     }  # fmt: skip
     # Behind the adjoints that it, or the law, may call.
     return function_from_source(source, namespace, after_gradients=True)
+
+
+def _slope(
+    law: wp.Function, arguments: tuple[str, ...], by: int, precision: Precision, data: Any,
+    params: Any,
+) -> wp.Function:  # fmt: skip
+    """The derivative of a law's vector by its vector ``by``; 0 where it has none."""
+    vec3, mat33 = precision.vec3, precision.mat33
+    kinds = list(arguments_of(law).values())
+    wide = FLOAT64 if kinds[by] is FLOAT64.vec3 else FLOAT32  # as a law of time is in any case
+    named = [f"a{k}" for k in range(len(arguments))]
+    types = {f"A{k}": kind for k, kind in enumerate(kinds)}
+    typed = ", ".join(f"{a}: {A}" for a, A in zip(named, types, strict=True))
+    along = function_from_source(
+        f"def along({typed}, e: Wide):\n    return wp.dot(law({', '.join(named)}), e)\n",
+        {"wp": wp, "law": law, "Wide": wide.vec3, **types}, after_gradients=False,
+    )  # fmt: skip
+    gradients = ", ".join(f"g{k}" for k in range(len(arguments) + 1))
+    row_of = function_from_source(
+        "def row_of(i: int, w: int, x: Vec3, d: Data, p: Params, e: Wide):\n"
+        f"    {gradients} = wp.grad(along)({', '.join(arguments)}, e)\n    return g{by}\n",
+        {"wp": wp, "along": along, "Vec3": vec3, "Wide": wide.vec3, "Data": data, "Params": params},
+        after_gradients=True,
+    )  # fmt: skip
+    real, Wide, one = precision.scalar, wide.vec3, wide.scalar(1.0)
+
+    def slope_of(i: int, w: int, x: vec3, d: data, p: params):
+        slope = mat33()
+        for r in range(3):
+            e = Wide()
+            e[r] = one
+            row = row_of(i, w, x, d, p, e)
+            for c in range(3):
+                slope[r, c] = real(row[c])
+        if not wp.isfinite(slope):
+            slope = mat33()
+        return slope
+
+    return function(slope_of, after_gradients=True)
+
+
+@functools.cache
+def follow_kernel(
+    law: wp.Function, arguments: tuple[str, ...], by: int, precision: Precision, data: Any,
+    params: Any,
+) -> wp.Kernel:  # fmt: skip
+    """Kernel: f += (df/dv) u on each member, v the law's argument ``by``."""
+    slope = _slope(law, arguments, by, precision, data, params)
+
+    @register
+    def particle_follow(
+        first: int,
+        members: wp.array(dtype=wp.int32),
+        world: wp.array(dtype=wp.int32),
+        parameters: wp.array(dtype=params),
+        d: data,
+        lead: wp.array(dtype=precision.vec3),
+        f_io: wp.array(dtype=precision.vec3),
+    ):
+        k = first + wp.tid()
+        i = members[k]
+        w = world[k]
+        f_io[i] = f_io[i] + slope(i, w, d.x[i], d, parameters[w]) * lead[i]
+
+    return particle_follow
+
+
+@functools.cache
+def slope_kernel(
+    law: wp.Function, arguments: tuple[str, ...], by: int, precision: Precision, data: Any,
+    params: Any,
+) -> wp.Kernel:  # fmt: skip
+    """Kernel: the slope += df/dv of each member, v the law's argument ``by``."""
+    slope = _slope(law, arguments, by, precision, data, params)
+
+    @register
+    def particle_slope(
+        first: int,
+        members: wp.array(dtype=wp.int32),
+        world: wp.array(dtype=wp.int32),
+        parameters: wp.array(dtype=params),
+        d: data,
+        slope_io: wp.array(dtype=precision.mat33),
+    ):
+        k = first + wp.tid()
+        i = members[k]
+        w = world[k]
+        slope_io[i] = slope_io[i] + slope(i, w, d.x[i], d, parameters[w])
+
+    return particle_slope
 
 
 @functools.cache

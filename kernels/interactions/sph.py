@@ -18,7 +18,7 @@ import warp as wp
 
 from ..engine.loops import Periodicity, box_type, minimum_image, reader
 from ..precision import Precision, function, function_from_source, register
-from ..warp_internals import argument_names
+from ..warp_internals import arguments as arguments_of
 
 # Where coincident particles are pushed along, within the line or plane of a lower dimension.
 DIRECTIONS = {1: (1.0, 0.0, 0.0), 2: (0.6, 0.8, 0.0), 3: (0.48, 0.6, 0.64)}
@@ -29,7 +29,7 @@ def bound_law(
     precision: Precision, params: Any,
 ) -> wp.Function:  # fmt: skip
     """``name(*variables, p)`` that calls ``law`` with, for each of its arguments, its source."""
-    arguments = ", ".join(sources[argument] for argument in argument_names(law))
+    arguments = ", ".join(sources[argument] for argument in arguments_of(law))
     signature = ", ".join(f"{variable}: real" for variable in variables)
     source = f"def {name}({signature}, p: Params):\n    return law({arguments})\n"
     return function_from_source(source, {"law": law, "real": precision.scalar, "Params": params})

@@ -231,11 +231,11 @@ class Constraint(ConstraintBase):
         launch(self.strain_kernel, self.count, inputs, self.model.device)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
-        """Add the virial of the multipliers of the last substep."""
+        """Add the virial of the multipliers of the last substep, and C^2 / (2 alpha)."""
         if not self.count:
             return
         seats = self.tuples.seats
-        inputs = [seats, self.model.box, self.struct, self.bodies, self.scale, virial]
+        inputs = [seats, self.model.box, self.struct, self.bodies, self.scale, energy, virial]
         launch(self.virial_kernel, len(seats.particle), inputs, self.model.device)
 
     def limits(self, probe: Probe) -> list[Limit]:

@@ -65,6 +65,8 @@ class ConstraintForce(Interaction):
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
         self.tuples = Tuples(self.name, model, [peer.constraint for peer in self.peers])
+        self.reads_velocity = any(peer.constraint.damping.any() for peer in self.peers)
+        self.conservative = not self.reads_velocity
         self.seats = self.tuples.seats
         self.count = len(self.seats.particle)
 

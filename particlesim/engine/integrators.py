@@ -5,9 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 from .. import validate
-from ..kernels.engine.integrate import integration_kernels, motion_type, tick_kernel
+from ..kernels.engine.copy import copy_kernel
+from ..kernels.engine.integrate import (
+    implicit_kernels,
+    integration_kernels,
+    motion_type,
+    tick_kernel,
+)
 from ..scene.settings import INTEGRATORS, Settings
 from .execution.launch import launch
+from .limit import explicit_step, predicted_step
 from .model import Model
 from .state import State
 
@@ -19,6 +26,11 @@ class Integrator:
     ``advance``; the constraints; ``finish``. A member says what happens in ``begin`` and
     ``advance``, made of :meth:`kick`, :meth:`drift` and :meth:`move`. Its class is given to the
     settings, ``Settings(integrator=YourClass)``, and ``model`` and ``state`` are there to be read.
+
+    A force on a particle that depends on its velocity, as drag and a magnetic field do, is taken at
+    the velocity half a kick ahead, v' = v + w f(v') dt / 2, to first order in v' - v (Rosenbrock
+    1963): a kick then turns a charge without changing its speed (Boris 1970) and lets drag decay by
+    (1 - gamma dt / 2) / (1 + gamma dt / 2) (Crank and Nicolson 1947).
 
     ``order`` is that of convergence in ``dt``. ``carries_forces`` says that a substep starts from
     the forces that the last one ended with; such a method takes no constraints.
@@ -45,7 +57,10 @@ class Integrator:
     carries_forces = False
     host = False  # whether it works in Python, and so has to be called in every substep
 
-    def __init__(self, model: Model, state: State, *, constrained: bool, remember: bool):
+    def __init__(
+        self, model: Model, state: State, *, constrained: bool = False, remember: bool = False,
+        implicit: bool = False, predicted: bool = False,
+    ):  # fmt: skip
         self.model, self.state, self.count = model, state, model.particle_count
         settings = model.settings
         forces = "force" in state
@@ -60,17 +75,27 @@ class Integrator:
             names |= {"previous_position"}
         if model.periodic:
             names |= {"image", "world"}
+        self.predicted = predicted and forces and self.carries_forces
+        if implicit:
+            names |= {"force_slope", "velocity_lead"}
+        if self.predicted:
+            names |= {"previous_force"}
         state.require(names)
         self.forces, self.constrained = forces, constrained
         self.kernels = integration_kernels(
             model.precision, model.periodic, forces, settings.compensated, constrained, remember
         )
+        self.implicit_kernels = implicit_kernels(model.precision, self.predicted)
         self.motion = _motion(model, state)
 
     @property
     def name(self) -> str:
         """What reports call it."""
         return next((n for n, each in METHODS.items() if each is type(self)), type(self).__name__)
+
+    def largest_step(self, omega_squared: float, gamma: float) -> float:
+        """Largest stable step of x'' = -omega^2 x - gamma x', the damping not implicit [time]."""
+        return explicit_step(omega_squared, gamma)
 
     def begin(self, dt: float) -> None:
         """Before the forces."""
@@ -86,6 +111,17 @@ class Integrator:
         """
         if self.constrained and dt > 0:
             self._launch(self.kernels.follow_corrections, 1.0 / dt)
+
+    def lead(self, dt: float) -> None:
+        """How far the velocity of the implicit forces is ahead, in ``state.velocity_lead``."""
+        state, kernel = self.state, self.implicit_kernels.lead
+        inputs = [0.5 * dt, self.motion, state.force_slope, state.velocity_lead]
+        launch(kernel, self.count, inputs, self.model.device)
+
+    def settle(self, dt: float) -> None:
+        """The sum of all forces is what takes the velocity there."""
+        inputs = [0.5 * dt, self.motion, self.state.velocity_lead]
+        launch(self.implicit_kernels.settle, self.count, inputs, self.model.device)
 
     def kick(self, dt: float) -> None:
         """v += w f dt, w = 1/m; nothing in a scene without forces."""
@@ -120,17 +156,29 @@ class VelocityVerlet(Integrator):
     """Kick dt/2, drift dt, forces, kick dt/2 (Swope et al. 1982, eq. 9). Second order.
 
     One evaluation of the forces a substep: the first kick uses those of the last substep. Forces
-    that depend on velocity see it after the first kick.
+    between particles that depend on velocities, as of dampers and viscosity, and those of one's own
+    see what the last substep's forces would make of them by its end, v + w f dt, which is of second
+    order too (Groot and Warren 1997, eq. 8).
     """
 
     order = 2
     carries_forces = True
 
+    def largest_step(self, omega_squared: float, gamma: float) -> float:
+        return predicted_step(omega_squared, gamma)
+
     def begin(self, dt: float) -> None:
         self.move(0.5 * dt, dt)
+        if self.predicted:
+            force, previous = self.state.force, self.state.previous_force
+            launch(copy_kernel(force.dtype), self.count, [force, previous], self.model.device)
+            self.kick(0.5 * dt)
 
     def advance(self, dt: float) -> None:
-        self.kick(0.5 * dt)
+        if self.predicted:
+            self._launch(self.kernels.correct, 0.5 * dt)
+        else:
+            self.kick(0.5 * dt)
 
 
 METHODS: dict[str, type[Integrator]] = dict(
@@ -161,6 +209,7 @@ def _motion(model: Model, state: State) -> Any:
         "x": "position", "v": "velocity", "w": "inverse_mass", "f": "force",
         "x_error": "position_error", "v_error": "velocity_error",
         "x_previous": "previous_position", "correction": "correction", "image": "image",
+        "f_previous": "previous_force",
         "world": "world",
     }  # fmt: skip
     for field, name in names.items():

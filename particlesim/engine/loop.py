@@ -19,7 +19,7 @@ from .execution.launch import owner
 from .integrators import method
 from .model import Model
 from .neighbors.lists import Neighbors
-from .observers import FINISH, FORCE, PROJECT, Observers
+from .observers import FINISH, FOLLOW, FORCE, PROJECT, Observers
 from .state import State
 
 LEFT_BY_FORCES = ("force", "density", "pressure")
@@ -60,10 +60,12 @@ class Loop:
                 "Settings", "integrator", "be symplectic_euler in a scene with constraints",
                 settings.plain["integrator"], "or leave the constraints out",
             )  # fmt: skip
+        self.implicit = [part for part in self.interactions if part.implicit]
         self.state.require({"position", "velocity"} | required)
         self.integrator = moves(
             model, self.state, constrained=bool(self.constraints),
-            remember="previous_position" in required,
+            remember="previous_position" in required, implicit=bool(self.implicit),
+            predicted=any(part.reads_velocity for part in self.interactions),
         )  # fmt: skip
         self.neighbors.allocate(self.state)
         for part in self.parts:
@@ -79,6 +81,7 @@ class Loop:
         self.observers.begin(dt)
         act(self.integrator, self.integrator.begin, dt)
         self.forces(dt)
+        self.follow(dt)
         act(self.integrator, self.integrator.advance, dt)
         self.constrain(dt, self.settings.iterations)
         act(self.integrator, self.integrator.finish, dt)
@@ -94,6 +97,16 @@ class Loop:
         now = self.state, self.neighbors, dt
         for interaction in self.passes:
             self.observers.act(interaction, FORCE, interaction.apply, *now)
+
+    def follow(self, dt: float) -> None:
+        """Forces that are implicit in the velocity follow it to where it will be in half a kick."""
+        if not self.implicit:
+            return
+        self.integrator.lead(dt)
+        now = self.state, self.neighbors, dt
+        for interaction in self.implicit if self.observers.all else ():  # who wants each part's own
+            self.observers.act(interaction, FOLLOW, interaction.follow, *now)
+        self.integrator.settle(dt)
 
     def constrain(self, dt: float, iterations: int) -> None:
         """Constraints project the positions, one after the other, in each iteration."""
@@ -176,6 +189,11 @@ class Loop:
     def time(self) -> float:
         """Simulated time since the start [s]."""
         return self.frame * self.settings.dt
+
+    @property
+    def work(self) -> float:
+        """Particles and pairs that an evaluation of the forces looks at, about."""
+        return self.model.particle_count + sum(each.work for each in self.neighbors.lists)
 
     def get(self, name: str) -> np.ndarray:
         """A per-particle array, copied to the host."""

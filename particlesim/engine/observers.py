@@ -12,7 +12,8 @@ import warp as wp
 from .execution.acting import act
 from .execution.launch import owner
 
-FORCE, PROJECT, FINISH = "force", "project", "finish"  # what a part is about to do, or has done
+# What a part is about to do, or has done.
+FORCE, FOLLOW, PROJECT, FINISH = "force", "follow", "project", "finish"
 
 
 class Observer:

@@ -11,12 +11,14 @@ import warp as wp
 
 from ..scene.part import Interaction
 from .execution.acting import Attributes, act
-from .limit import Limit, explicit_step
+from .limit import Limit
 from .loop import Loop
 from .model import Model
+from .rates import Rates, turns
 from .spectrum import Largest, largest
 
-STEPS = 30  # applications of a Jacobian, two evaluations of the force each
+STEPS, LEAST = 30, 4  # applications of a Jacobian
+WORK = 2e7  # particles and pairs that forces are evaluated for
 TOLERANCE = 0.005  # of an eigenvalue: half of that in the frequency
 SAMPLE = 1024  # particles whose neighbours are looked for among as many others
 CLUMPED = 0.01  # of the mean spacing: closer pairs count as overlapping
@@ -32,12 +34,15 @@ class Probe:
     Args:
         loop: What is in motion, at any moment outside a step.
         quick: Rates that are surely within the settings' limits need not be exact.
+        steps: Applications of a Jacobian at most, two evaluations of the force each; fewer where
+            these would take long.
     """
 
-    def __init__(self, loop: Loop, quick: bool = False):
+    def __init__(self, loop: Loop, quick: bool = False, steps: int = STEPS):
         self.loop, self.model, self.state, self.quick = loop, loop.model, loop.state, quick
+        self.steps = max(LEAST, min(steps, int(WORK / (2.0 * max(loop.work, 1.0)))))
         self.settings = loop.settings
-        self.rates: list[tuple[Interaction, float, float]] = []  # omega^2, gamma of those asked
+        self.rates: list[tuple[Interaction, Rates]] = []  # of those asked
 
     def __enter__(self) -> Self:
         self._kept = {name: wp.clone(array) for name, array in self.state.arrays.items()}
@@ -131,7 +136,10 @@ class Probe:
         """The limit from the gradients of a part's force, by differences; none if it has none.
 
         omega^2 is the largest eigenvalue of -W^(1/2) (df/dx) W^(1/2), gamma that of the same with
-        df/dv, W the inverse masses; ``most`` are upper bounds of both that the part knows.
+        df/dv, W the inverse masses; ``most`` are upper bounds of both that the part knows. An
+        eigenvalue of df/dv that is imaginary is a rotation: an explicit kick along the tangent
+        gains energy at any step. What is implicit in the velocity is stable at any; from 2 / gamma
+        on it turns velocities about.
         """
         return self.together([part], most)
 
@@ -141,16 +149,23 @@ class Probe:
         """As :meth:`response`, of the sum of several parts."""
         if "force" not in self.state or not self._mobile.any():
             return []
-        frequency, damping = (self._largest(parts, what) for what in ("position", "velocity"))
-        omega_squared, gamma = min(frequency.bound, most[0]), min(damping.bound, most[1])
-        if omega_squared == gamma == 0.0:
+        frequency = self._largest(parts, "position")
+        damping = self._largest([each for each in parts if each.reads_velocity], "velocity")
+        implicit = self._largest([each for each in parts if each.implicit], "velocity")
+        rates = Rates(
+            min(frequency.bound, most[0]), min(damping.bound, most[1]), implicit.bound,
+            turn=turns(damping), turns=turns(implicit) > 0.0,
+        )  # fmt: skip
+        if rates.none:
             return []
         if len(parts) == 1:
-            self.rates.append((parts[0], omega_squared, gamma))
+            self.rates.append((parts[0], rates))
         name = " + ".join(part.name for part in parts)
-        dt = explicit_step(omega_squared, gamma)
-        place = self._peak(frequency if omega_squared else damping)
-        return [Limit(name, *_words(omega_squared, gamma, dt), *place)]
+        kind, dt, reason = rates.tightest(self.loop.integrator)
+        found = {"frequency": frequency, "force": frequency}.get(kind, damping)
+        if not len(found.vector):
+            found = implicit if len(implicit.vector) else frequency
+        return [Limit(name, kind, dt, reason, *self._peak(found))]
 
     def damping(self, part: Interaction) -> float:
         """gamma alone, the largest rate at which a part's force answers to velocities [1/time]."""
@@ -163,10 +178,12 @@ class Probe:
 
     def _largest(self, parts: Sequence[Interaction], what: str) -> Largest:
         """The largest eigenvalue of the Jacobian with respect to position or velocity."""
+        if not parts:
+            return Largest(0.0, 0.0, np.zeros(0), 0)
         apply = self._operator(parts, what)
         rng = np.random.default_rng(0)
         start = rng.normal(size=3 * int(self._mobile.sum()))
-        steps = max(4, min(STEPS, int(MEMORY / (2 * len(start)))))
+        steps = max(LEAST, min(self.steps, int(MEMORY / (2 * len(start)))))
         enough = 0.0
         if self.quick:
             dt = self.settings.substep
@@ -214,19 +231,6 @@ class Probe:
         """Copy what the loops read into the order of their rows."""
         for each in self.loop.neighbors.lists:
             each.gather(self.state, each.names)
-
-
-def _words(omega_squared: float, gamma: float, dt: float) -> tuple[str, float, str]:
-    """Kind, substep and reason of a limit from rates."""
-    if not np.isfinite(omega_squared + gamma):
-        return "force", 0.0, "the force is not finite at the present state"
-    omega = float(np.sqrt(omega_squared))
-    rates = f"omega = {omega:.4g} /s, gamma = {gamma:.4g} /s"
-    if not gamma:
-        return "frequency", dt, f"2 / omega, omega = {omega:.4g} /s"
-    if not omega:
-        return "damping", dt, f"2 / gamma, gamma = {gamma:.4g} /s"
-    return "frequency and damping", dt, f"4 / (gamma + sqrt(gamma^2 + 4 omega^2)), {rates}"
 
 
 def _spacing(model: Model, x: np.ndarray, v: np.ndarray, dt: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,12 +22,14 @@ class Largest:
         residual: Norm of A z - theta z for the unit vector z: as far off the size may be.
         vector: z, (n,); largest where the eigenvector is.
         steps: Applications of the operator.
+        values: All that was found of the spectrum, complex.
     """
 
     size: float
     residual: float
     vector: np.ndarray
     steps: int
+    values: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def bound(self) -> float:
@@ -91,4 +93,4 @@ def _ritz(basis: np.ndarray, images: np.ndarray) -> Largest:
     z = vectors[:, top] @ basis
     norm = np.linalg.norm(z)
     residual = np.linalg.norm(vectors[:, top] @ images - values[top] * z) / norm
-    return Largest(float(abs(values[top])), float(residual), np.abs(z) / norm, len(basis))
+    return Largest(float(abs(values[top])), float(residual), np.abs(z) / norm, len(basis), values)

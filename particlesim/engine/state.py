@@ -12,7 +12,7 @@ from ..kernels.engine.copy import zero_kernel
 from .execution.launch import launch
 from .model import Model
 
-# The engine's own arrays: None for numbers, 3 for vectors.
+# The engine's own arrays: None for numbers, 3 for vectors, 9 for matrices.
 FIELDS: dict[str, int | None] = {
     "position": 3,
     "velocity": 3,
@@ -20,6 +20,9 @@ FIELDS: dict[str, int | None] = {
     "inverse_mass": None,
     "radius": None,
     "force": 3,
+    "previous_force": 3,  # of the substep before, where velocities are predicted with it
+    "force_slope": 9,  # df/dv of the forces that are implicit in the velocity
+    "velocity_lead": 3,  # how far ahead the velocity is that these are taken at
     "position_error": 3,  # what rounding has kept from x, compensated sums
     "velocity_error": 3,
     "correction": 3,  # what the constraints have moved x by in this substep
@@ -98,7 +101,7 @@ class State:
                 f"State: name must be one of {', '.join(known)}, got {name!r}; give the particles "
                 f"an attribute of that name."
             )
-        return precision.scalar if width is None else precision.vec3
+        return {None: precision.scalar, 3: precision.vec3, 9: precision.mat33}[width]
 
     def __getitem__(self, name: str) -> wp.array:
         if name not in self.arrays:
@@ -124,10 +127,11 @@ class State:
         return name in self.arrays
 
     def clear_forces(self) -> None:
-        """Set all forces to zero, if there are forces."""
-        if "force" in self.arrays:
-            force = self.arrays["force"]
-            launch(zero_kernel(force.dtype), self.count, [force], force.device)
+        """Set all forces, and how they answer to velocities, to zero where there are any."""
+        for name in ("force", "force_slope"):
+            if name in self.arrays:
+                array = self.arrays[name]
+                launch(zero_kernel(array.dtype), self.count, [array], array.device)
 
     def reset(self, worlds: Iterable[int]) -> None:
         """Put the rows of these worlds back to their start values."""

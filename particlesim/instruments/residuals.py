@@ -32,6 +32,19 @@ def residuals(constraint: Any, sim: Source) -> tuple[np.ndarray, np.ndarray] | N
     return _residuals(constraint, sim)
 
 
+def off(constraint: Constraint, sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
+    """How far the particles of tuples are off, in parts of their extent, (m,), and the worlds.
+
+    |C + alpha (F + beta dC/dt)| / |grad C|, F the force of the last substep's multiplier, over the
+    largest distance from the first particle; infinite where C is not 0 and has no gradient.
+    """
+    if not constraint.count:
+        return None
+    kernel = kernels.off_kernel(constraint.tuples.solved(constraint, sim.state))
+    inputs = [sim.model.box, constraint.struct, constraint.bodies, constraint.scale]
+    return _run(kernel, constraint.count, inputs, sim), constraint.tuples.world
+
+
 @functools.singledispatch
 def _residuals(constraint: Any, sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
     return None

@@ -13,13 +13,15 @@ import numpy as np
 
 from .. import validate
 from ..constraints.constraint import Constraint
-from ..engine.limit import Limit, explicit_step
+from ..engine.limit import Limit
 from ..engine.loop import Loop
 from ..engine.probe import Probe
+from ..engine.rates import Rates
 from ..engine.report import Report, grid
 from ..interactions.fusion import fuse
 from ..scene.scene import Scene
 from ..scene.settings import AUTO, Settings
+from .foresight import look_ahead
 
 
 @dataclass(frozen=True, repr=False)
@@ -87,27 +89,38 @@ class Stability(Report):
 PROVISIONAL = 1.0 / 60.0  # a frame's time while it is yet to be found
 MANY = 10.0  # times the speed that anything has, or gains in a frame
 FEW = 1e-4  # of the size of the scene: what rounding and stretched springs may be off
+SAFETY = 0.5  # of the limit, at most, where the settings leave it open
 NEGLIGIBLE = 0.97  # of the tightest limit: what several parts do together matters below it
 
 _checked: weakref.WeakSet[Loop] = weakref.WeakSet()
+_warned: weakref.WeakSet[Loop] = weakref.WeakSet()
 
 
 class StabilityWarning(UserWarning):
     """Settings are past the limit of a scene."""
 
 
-def stability(loop: Loop, quick: bool = False) -> Stability:
-    """The limits of all parts at the present moment (see ``Simulation.stability``).
+def stability(loop: Loop) -> Stability:
+    """The limits of all parts now and on the path ahead (see ``Simulation.stability``)."""
+    limits = _limits_now(loop)
+    ahead = look_ahead(loop, limits).limit
+    limits += [] if ahead is None else [ahead]
+    return Stability(_in_order(limits), loop.settings)
 
-    ``quick``: limits that the settings surely keep may be smaller than they are.
-    """
+
+def _in_order(limits: list[Limit]) -> list[Limit]:
+    return sorted(limits, key=lambda limit: limit.dt)
+
+
+def _limits_now(loop: Loop, quick: bool = False) -> list[Limit]:
+    """Those of the present; ``quick``: what the settings surely keep may be smaller than it is."""
     limits: list[Limit] = []
     if loop.model.particle_count:
         with Probe(loop, quick) as probe:
             for part in [*loop.interactions, *loop.constraints]:
                 limits += part.limits(probe)
             limits += _together(probe, limits)
-    return Stability(sorted(limits, key=lambda limit: limit.dt), loop.settings)
+    return limits
 
 
 def _together(probe: Probe, limits: list[Limit]) -> list[Limit]:
@@ -116,30 +129,34 @@ def _together(probe: Probe, limits: list[Limit]) -> list[Limit]:
     The largest eigenvalue of a sum is at most the sum of the largest eigenvalues, so often there
     is nothing to ask.
     """
-    parts = [part for part, _, _ in probe.rates]
-    bound = explicit_step(
-        sum(omega_squared for _, omega_squared, _ in probe.rates),
-        sum(gamma for _, _, gamma in probe.rates),
-    )
+    parts = [part for part, _ in probe.rates]
+    bound = sum((rates for _, rates in probe.rates), Rates()).tightest(probe.loop.integrator)[1]
     tightest = min((limit.dt for limit in limits), default=math.inf)
     if len(parts) < 2 or bound > NEGLIGIBLE * tightest:
         return []
     return probe.together(parts)
 
 
-def warn_if_past(loop: Loop) -> None:
-    """Warn, once a simulation, if its settings are past the limit, or its start does not fit."""
-    if loop in _checked or not loop.settings.dt > 0:
+def warn_if_past(loop: Loop, again: bool = False) -> None:
+    """Warn, once a simulation, if its settings are past the limit, or its start does not fit.
+
+    Args:
+        loop: What is in motion.
+        again: It has become faster: only the limits, where nothing was said of them.
+    """
+    if not loop.settings.dt > 0 or (loop in _warned if again else loop in _checked):
         return
-    _checked.add(loop)
-    for said in (misfit(loop), *(part.complaint() for part in loop.parts)):
-        if said:
-            warnings.warn(said, StabilityWarning, stacklevel=3)
-    if stability(loop, quick=True).safe:
-        return
-    report = stability(loop)
+    if not again:
+        _checked.add(loop)
+        for said in (misfit(loop), *(part.complaint() for part in loop.parts)):
+            if said:
+                warnings.warn(said, StabilityWarning, stacklevel=3)
+    report = Stability(_in_order(_limits_now(loop, quick=True)), loop.settings)
+    if not report.safe or not again:
+        report = stability(loop)
     if report.safe or report.binding is None:
         return
+    _warned.add(loop)
     limit = report.binding
     remedy = "look at what pushes it"
     if math.isfinite(report.substeps):
@@ -154,7 +171,7 @@ def warn_if_past(loop: Loop) -> None:
 
 
 def automatic(scenes: Sequence[Scene], settings: Settings, device: Any) -> Settings:
-    """The settings with dt or substeps chosen by the limit of the start, times ``safety``.
+    """The settings with dt or substeps chosen by the limits of the start and of the path ahead.
 
     Raises:
         ValueError: Nothing limits the substep, or nothing is small enough.
@@ -162,7 +179,7 @@ def automatic(scenes: Sequence[Scene], settings: Settings, device: Any) -> Setti
     of_frame = settings.dt == AUTO
     name = "dt" if of_frame else "substeps"
     trial = settings.replace(dt=PROVISIONAL) if of_frame else settings.replace(substeps=1)
-    limit = settings.safety * stability(Loop(scenes, trial, device, fuse)).dt
+    limit = _chosen(Loop(scenes, trial, device, fuse), settings.safety)
     if not 0.0 < limit < math.inf:
         what = "no part limits it" if limit else "the forces are not finite at the start"
         raise validate.fail(
@@ -171,6 +188,17 @@ def automatic(scenes: Sequence[Scene], settings: Settings, device: Any) -> Setti
     if of_frame:
         return settings.replace(dt=settings.substeps * limit)
     return settings.replace(substeps=max(1, math.ceil(settings.dt / limit * (1.0 - 1e-9))))
+
+
+def _chosen(loop: Loop, safety: float | None) -> float:
+    """The substep that ``"auto"`` takes: a part of the limit, or what the energy asks for, too."""
+    limits = _limits_now(loop)
+    ahead = look_ahead(loop, limits)
+    limits += [] if ahead.limit is None else [ahead.limit]
+    largest = min((each.dt for each in limits), default=math.inf)
+    if safety is not None:
+        return safety * largest
+    return min(SAFETY * largest, ahead.energy_step) if largest < math.inf else math.inf
 
 
 def misfit(loop: Loop) -> str:

@@ -14,7 +14,6 @@ from ..scene.law import law
 from .pair import Pair
 
 MOST = 4096  # bodies of a world whose pairs are all looked at
-FRAMES = 10  # ahead, within which they meet
 PHASE = 0.5  # omega dt at the pericentre; leapfrog's energy is off by about a third of its square
 
 
@@ -23,8 +22,8 @@ def closest_approach(part: Any, probe: Probe) -> list[Limit]:
 
     Two bodies follow a conic while the tide of all others is less than what they pull each other
     with: r_p = p / (1 + e), p = h^2 / mu, e^2 = 1 + 2 E p / mu, mu = G (m_i + m_j). There
-    omega^2 = mu / (r_p^2 + s^2)^(3/2), with the softening s. Counted are those that may be there
-    within ten frames: no sooner than in (2/3) r / sqrt(v^2 + 2 mu / r), as on a parabola.
+    omega^2 = mu / (r_p^2 + s^2)^(3/2), with the softening s. Counted are those that come closer, or
+    are bound and will.
     """
     found = []
     for w, peer in enumerate(part.peers):
@@ -60,9 +59,7 @@ def _of_world(part: Any, peer: Any, probe: Probe, w: int, rows: np.ndarray) -> l
         omega = np.sqrt(mu) / (closest**2 + s**2) ** 0.75
         alone = np.linalg.norm(tide, axis=1) < np.linalg.norm(own, axis=1)
         coming = ((d * u).sum(axis=1) < 0) | (energy < 0)
-        time = 2.0 / 3.0 * r / np.sqrt((u**2).sum(axis=1) + 2.0 * mu / r)
-    soon = time < FRAMES * probe.settings.dt
-    ready = alone & coming & soon & (mu > 0) & (omega > 0)
+    ready = alone & coming & (mu > 0) & (omega > 0)
     if not ready.any():
         return []
     k = int(np.argmax(np.where(ready, omega, 0.0)))

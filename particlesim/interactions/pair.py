@@ -78,6 +78,8 @@ class Pair(Interaction):
             self.parameters |= argument.values
             self.quantities |= argument.quantities
         self.requires = frozenset({"force"}) | self.quantities
+        self.reads_velocity = "velocity" in self.quantities
+        self.conservative = potential is not None and not self.reads_velocity
 
     @property
     def acts(self) -> bool:

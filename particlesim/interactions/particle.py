@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from ..scene.law import law as make_law
 from ..scene.part import Interaction
 from .arguments import WIDTHS, Arguments
 from .consistency import of_particle_force
+from .pulses import unseen
 
 
 class ParticleForce(Interaction):
@@ -32,6 +33,9 @@ class ParticleForce(Interaction):
     is what has been climbed: with every crossing of an axis it changes by what the potential
     rises across the box, so that of a uniform force it is -f.x at the unwrapped position. It is
     conserved where the potential is a sum of one for each axis, or the same on opposite sides.
+
+    A force that depends on velocity is taken implicitly in it (see ``Integrator``), by its
+    derivative; of a law that Warp cannot derive, as one that loops, it is explicit.
 
     Args:
         law: Returns the force, ``wp.vec3``; None: it is derived from ``potential``. Its parameters
@@ -81,6 +85,11 @@ class ParticleForce(Interaction):
             self.quantities |= each.quantities
             timed |= _timed(each)
         self.requires = frozenset({"force"} | self.quantities | ({"time"} if timed else set()))
+        self.implicit = self.law is not None and _is_implicit(self.law)
+        self.reads_velocity = "velocity" in self.quantities and not self.implicit
+        self.conservative = self.potential is not None and not (
+            timed or "velocity" in self.quantities
+        )
 
     def _check_derived(self) -> None:
         if self.potential is None:
@@ -155,12 +164,26 @@ class ParticleForce(Interaction):
         return self.functions[k], tuple(called)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        inputs = [self.members, self.world, self.params, self.data, state.force]
-        launch(self.kernel, self.count, inputs, self.model.device)
+        self._launch(self.kernel, state.force)
+        if self.implicit:
+            self._launch(self._sloped(kernels.slope_kernel), state.force_slope)
+
+    def follow(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        self._launch(self._sloped(kernels.follow_kernel), state.velocity_lead, state.force)
+
+    def _sloped(self, kernel: Callable[..., wp.Kernel]) -> wp.Kernel:
+        by = self.arguments[0].names.index("velocity")
+        return kernel(*self._called(0), by, *self._types)
+
+    def _launch(self, kernel: wp.Kernel, *arrays: wp.array) -> None:
+        inputs = [self.members, self.world, self.params, self.data, *arrays]
+        launch(kernel, self.count, inputs, self.model.device)
 
     def complaint(self) -> str:
-        """That the potential is not that of the force, or that a law leaves the precision."""
-        return of_particle_force(self)
+        """That the potential is not that of the force, that a law leaves the precision, or that it
+        is large between substeps only.
+        """
+        return of_particle_force(self) or (unseen(self) if _timed(self.arguments[0]) else "")
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         if self.potential is not None:
@@ -176,6 +199,15 @@ def _widened(source: str, kind: Any) -> str:
         numbers = (f"wp.float64({source}[{k}])" for k in range(WIDTHS[kind]))
         return f"wp.vec{WIDTHS[kind]}d({', '.join(numbers)})"
     return source if kind is int else f"wp.float64({source})"
+
+
+def _is_implicit(law: Law) -> bool:
+    """Whether it takes the velocity, and Warp can derive it."""
+    try:
+        law.check_derivable("ParticleForce")
+    except ValueError:
+        return False
+    return law.parameters.get("velocity") is wp.vec3
 
 
 def _timed(given: Arguments) -> bool:

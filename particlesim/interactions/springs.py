@@ -71,6 +71,8 @@ class Springs(Interaction):
             "damping": np.concatenate([peer.damping for peer in self.peers]),
         }
         model.fits(self.name, columns)
+        self.reads_velocity = bool(columns["damping"].any())
+        self.conservative = not self.reads_velocity
         rows = topology.incidence(pairs)
         self.count = len(rows["particle"])
         if not self.count:

@@ -117,7 +117,8 @@ class Interaction(Part):
     ``apply`` it adds to ``state.force``. ``state`` is the present one; ``neighbors`` holds the pair
     lists, up to date for it. ``parameters``, where there are any, is a dict of numbers and
     3-vectors that may differ from world to world. ``cutoff`` is the distance within which
-    neighbours are looked for; None: all pairs of a world.
+    neighbours are looked for; None: all pairs of a world. Where ``apply`` reads no velocities, say
+    ``reads_velocity = False``: velocity Verlet then need not predict them.
 
     ``apply`` is recorded once and replayed in every substep: ``wp.launch``, ``wp.copy``, ``zero_``
     and ``fill_`` are, with the numbers and arrays that they are given then, and so is
@@ -154,10 +155,19 @@ class Interaction(Part):
 
     requires: frozenset[str] = frozenset({"force"})
     cutoff: float | None = None
+    reads_velocity: bool = True  # in any other way than that of ``follow``
+    conservative: bool = False  # `measure` adds the potential of all that it does
+    implicit: bool = False  # adds df/dv of its force to ``state.force_slope``, and has ``follow``
 
     def apply(self, state: Any, neighbors: Any, dt: float) -> None:
         """Add forces."""
         raise validate.undefined(self, "apply(self, state, neighbors, dt)")
+
+    def follow(self, state: Any, neighbors: Any, dt: float) -> None:
+        """Add (df/dv) u, by which the force differs where the velocity is u ahead.
+
+        u is ``state.velocity_lead``; only of an ``implicit`` one.
+        """
 
     def measure(self, state: Any, energy: Any, virial: Any) -> None:
         """Add the potential energy and the virial of each particle (float64), on demand."""

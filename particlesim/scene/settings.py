@@ -21,12 +21,12 @@ class Settings:
 
     Args:
         dt: Time of one frame, that is of one ``sim.step()`` [s]. ``"auto"``: the simulation takes
-            ``substeps * safety * stability().dt`` of its start, and has that number in its own
-            ``settings``.
-        safety: Part of the largest safe substep that ``"auto"`` takes, above 0, at most 1. The
-            limit is that of the start, and what starts at rest may become stiffer.
+            ``substeps`` times what ``safety`` says, and has that number in its own ``settings``.
+        safety: Part of the largest safe substep, ``stability().dt`` at the start, that ``"auto"``
+            takes, above 0, at most 1. None: 0.5, or less where the energy would not stay within a
+            tenth of itself on the path that ``stability()`` looks ahead on.
         substeps: Substeps a frame; each advances by ``dt / substeps``. ``"auto"``: as many as make
-            a substep at most ``safety * stability().dt``, likewise.
+            a substep at most what ``safety`` says.
         iterations: Sweeps over the constraints a substep (XPBD). Compliant constraints do not
             depend on it; stiff ones come closer to C = 0.
         integrator: ``"symplectic_euler"`` (first order, any scene) or ``"velocity_verlet"``
@@ -83,7 +83,7 @@ class Settings:
     retries: int = 4
     energy_growth: float = 100.0
     ledger: bool = False
-    safety: float = 0.5
+    safety: float | None = None
 
     def __new__(cls, *args: Any, **knobs: Any) -> Settings:
         validate.known("Settings", knobs, [f.name for f in dataclasses.fields(cls)], "knob")
@@ -92,7 +92,9 @@ class Settings:
     def __post_init__(self) -> None:
         owner = "Settings"
         checked: dict[str, Any] = {
-            "safety": validate.number(owner, "safety", self.safety, above=0.0, maximum=1.0),
+            "safety": None
+            if self.safety is None
+            else validate.number(owner, "safety", self.safety, above=0.0, maximum=1.0),
             "iterations": validate.whole(owner, "iterations", self.iterations, minimum=1),
             "retries": validate.whole(owner, "retries", self.retries, minimum=1),
             "energy_growth": validate.number(owner, "energy_growth", self.energy_growth, above=1.0),

@@ -11,6 +11,7 @@ from .. import validate
 from ..engine.frames import Frames
 from ..engine.loop import Loop
 from ..instruments.ledger.accounts import Accounts, motion
+from ..instruments.watchdog.rounds import Rounds
 from ..instruments.watchdog.watch import Watchdog
 from ..scene.scene import Scene
 
@@ -18,8 +19,10 @@ from ..scene.scene import Scene
 class Writer:
     """Writes, and has all who derive something from what is written forget it."""
 
-    def __init__(self, frames: Frames, watchdog: Watchdog, accounts: Accounts | None):
-        self.frames, self.loop = frames, frames.loop
+    def __init__(
+        self, frames: Frames, watchdog: Watchdog, rounds: Rounds, accounts: Accounts | None
+    ):
+        self.frames, self.loop, self.rounds = frames, frames.loop, rounds
         self.watchdog, self.accounts = watchdog, accounts
 
     def set(self, name: str, value: Any, rows: slice) -> None:
@@ -77,6 +80,7 @@ class Writer:
             self.loop.neighbors.renew(self.loop.state, worlds)
             for part in self.loop.parts:
                 part.placed(worlds)
+        self.rounds.begin_anew(worlds)
         if name in ("position", "velocity"):
             self.watchdog.placed(self.loop, worlds)
         self.loop.unknown_forces.update(worlds)
@@ -100,6 +104,7 @@ class Writer:
         for part in loop.parts:
             part.reset(chosen)
         self.watchdog.reset(self.frames, chosen)
+        self.rounds.begin_anew(chosen)
         if self.accounts is not None:
             self.accounts.begin_anew(chosen)
         loop.unknown_forces.update(chosen)

@@ -16,6 +16,7 @@ from ..engine.model import batch
 from ..instruments.ledger.accounts import Accounts
 from ..instruments.stability import automatic, warn_if_past
 from ..instruments.watchdog.incident import SimulationWarning
+from ..instruments.watchdog.rounds import Rounds
 from ..instruments.watchdog.watch import Watchdog
 from ..interactions.fusion import fuse
 from ..output import checkpoint
@@ -69,8 +70,9 @@ class Simulation(Reading):
             self.accounts = Accounts(self.loop)
             self.loop.observers.all.append(self.accounts)
         self.watchdog = Watchdog(self.loop.model, self.loop.neighbors)
+        self.rounds = Rounds(self.loop, self.watchdog.limits)
         self.frames = Frames(self.loop, self.watchdog)
-        self.writer = Writer(self.frames, self.watchdog, self.accounts)
+        self.writer = Writer(self.frames, self.watchdog, self.rounds, self.accounts)
 
     def substep(self, dt: float) -> None:
         """Advance by ``dt`` outside a frame (see :meth:`particlesim.engine.loop.Loop.substep`)."""
@@ -95,13 +97,26 @@ class Simulation(Reading):
                 SimulationWarning,
                 stacklevel=2,
             )
-        if self.particle_count and self.settings.dt > 0:
+        moves = self.particle_count and self.settings.dt > 0
+        if moves:
+            self._look(first=True)
             if self.loop.integrator.carries_forces:
                 self.loop.know_forces()
             self.frames.run(self.settings.substeps)
             if self.watchdog.alarmed:
                 self.watchdog.attend(self.frames)
         self.loop.frame += 1
+        if moves:
+            self._look()
+
+    def _look(self, first: bool = False) -> None:
+        """Make a round of what is looked at now and then; ``first``: before anything has moved."""
+        rounds = self.rounds
+        if not self.settings.watchdog:
+            return
+        if rounds.made < 0 if first else rounds.due() or self.watchdog.hurried:
+            rounds.make()
+            self.watchdog.forget()
 
     def run(
         self,

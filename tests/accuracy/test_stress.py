@@ -17,7 +17,7 @@ def swing():
 def test_settings_that_the_scene_chooses():
     seen = []
     table = ps.stress(
-        swing, ps.Settings(dt=0.1, substeps="auto"), frames=1, device="cpu",
+        swing, ps.Settings(dt=0.1, substeps="auto", safety=0.5), frames=1, device="cpu",
         progress=lambda *at: seen.append(at),
     )  # fmt: skip
     # omega = 10, so that the limit is 0.2 s; half of it is a frame.

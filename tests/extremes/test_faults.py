@@ -8,7 +8,6 @@ import pytest
 
 from cases.faults import automatic, controls, parts, ready, starts, steps
 from cases.faults.judge import REFUSED, RIGHT, TOLD, verdict
-from cases.faults.pending import PENDING
 
 FAULTS = [row for each in (steps, starts, parts) for row in each.rows()]
 AUTOMATIC = list(automatic.rows())
@@ -19,8 +18,6 @@ def cases(rows):
     """The rows as parameters of a test, by name."""
     for row in rows:
         marks = [pytest.mark.slow] if row.slow else []
-        if row.name in PENDING:
-            marks.append(pytest.mark.xfail(strict=True, reason=PENDING[row.name]))
         yield pytest.param(row, id=row.name, marks=marks)
 
 
@@ -47,4 +44,3 @@ def test_the_tables_are_whole():
     names = [row.name for row in (*FAULTS, *AUTOMATIC, *CONTROLS)]
     assert len(set(names)) == len(names)
     assert len(FAULTS) >= 110 and len(CONTROLS) >= 67
-    assert PENDING.keys() <= set(names)

@@ -76,9 +76,18 @@ def test_without_neighbours_there_is_no_list(device):
     assert found.lists == []
     assert sim.neighbors.lists == []
     assert found.conditional == []
+    implicit = {"force_slope", "velocity_lead"}  # in the velocity, as drag is
+    assert set(found.arrays) == COMPENSATED | {"force", "inverse_mass", "mass"} | implicit
+    forces = ["particle_force", "particle_force", "particle_slope", "spring_force"]
+    assert kernels(found) == ["zero_rows", "zero_rows", *forces, "lead", "settle", "advance"]
+
+
+def test_without_forces_of_velocity_nothing_is_implicit_or_predicted(device):
+    scene = scene_with(ps.UniformGravity(), ps.Springs([(0, 1)], 1.0))
+    _, found = explained(scene, device, integrator="velocity_verlet")
     assert set(found.arrays) == COMPENSATED | {"force", "inverse_mass", "mass"}
-    forces = ["particle_force", "particle_force", "spring_force"]
-    assert kernels(found) == ["zero_rows", *forces, "advance"]
+    forces = ["particle_force", "spring_force"]
+    assert kernels(found) == ["advance", "zero_rows", *forces, "kick_only"]
 
 
 def test_gravity_looks_at_all_and_keeps_no_rows(device):
@@ -140,7 +149,7 @@ def test_the_report_reads(liquid, device):
         "position ",
         "12.0 B",
         "pair lists",
-        "a substep: 6 launches",
+        "a substep: 10 launches",
         "UniformGravity",
         "when neighbour lists are rebuilt",
         "execution: graph",

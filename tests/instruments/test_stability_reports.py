@@ -117,7 +117,7 @@ def test_dt_auto():
 
 
 def test_substeps_auto():
-    sim = simulation(oscillator(), dt=1.0, substeps="auto")
+    sim = simulation(oscillator(), dt=1.0, substeps="auto", safety=0.5)
     assert sim.settings.substeps == math.ceil(1.0 / (0.5 * sim.stability().dt))
 
 
@@ -159,7 +159,7 @@ def test_tradeoff_of_dt_auto():
     assert all(isinstance(row.settings.dt, float) and not row.diverged for row in table.rows)
     table = ps.tradeoff(
         oscillator, {"substeps": ["auto", 20]}, error="energy", frames=3, repeats=1,
-        settings=ps.Settings(dt=0.5), device="cpu",
+        settings=ps.Settings(dt=0.5, safety=0.5), device="cpu",
     )  # fmt: skip
     assert table.rows[0].settings.substeps == 4  # 0.5 / (0.5 * 0.2828)
 

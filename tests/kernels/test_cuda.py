@@ -81,6 +81,13 @@ def few_forces(periodic, count):
     return scene
 
 
+def damped():
+    scene = particles()
+    scene.add_interaction(ps.Springs([(0, 1)], 1.0, 1.0, damping=1.0))
+    scene.add_interaction(ps.Drag(1.0))
+    return scene
+
+
 def fluid(periodic, **options):
     scene = particles(periodic=periodic)
     scene.add_interaction(
@@ -113,7 +120,8 @@ VERLET = {"integrator": "velocity_verlet"}
 SCENES = {
     "gas": (lambda: particles(), {}),
     "uncompensated_gas": (lambda: particles(), {"compensated": False}),
-    "forces": (forces, {}),
+    "forces": (forces, {"ledger": True}),
+    "damped": (damped, VERLET),
     "periodic_forces": (lambda: few_forces(BOX, 600), VERLET | {"compensated": False}),
     "small_periodic_world": (lambda: few_forces(BOX, 20), {}),
     "fluid": (lambda: fluid(None, viscosity=ps.ArtificialViscosity(0.1)), {}),
@@ -125,7 +133,9 @@ SCENES = {
     **{name: (lambda name=name: load_scene(name).build(), {}) for name in ready_scenes()},
 }  # fmt: skip
 
-EVERY_KERNEL = ("forces", "periodic_forces", "fluid", "constraints", "breaking", "star_collision")
+EVERY_KERNEL = (
+    "forces", "damped", "periodic_forces", "fluid", "constraints", "breaking", "star_collision"
+)  # fmt: skip
 
 
 @pytest.fixture

@@ -119,13 +119,13 @@ def _together(sim: Simulation, fraction: float) -> None:
     free = _free(sim)
     if len(free) > 1:
         i, j = free[len(free) // 2 - 1 : len(free) // 2 + 1]
-        x = sim.position
+        x = sim.get("position")
         x[j] = x[i] + fraction * (x[j] - x[i])
         sim.position = x
 
 
 def _fast(sim: Simulation) -> None:
-    v, free = sim.velocity, _free(sim)
+    v, free = sim.get("velocity"), _free(sim)
     speed = np.linalg.norm(v, axis=1).max()
     # Where nothing moves yet: a hundredth of the scene's size a frame.
     typical = speed or 0.01 * _size(sim) / max(sim.settings.dt, 1e-30)
@@ -142,7 +142,7 @@ def _heavy(sim: Simulation, ratio: float) -> None:
 
 
 def _far(sim: Simulation) -> None:
-    x, free = sim.position, _free(sim)
+    x, free = sim.get("position"), _free(sim)
     if len(free):
         x[free[len(free) // 2]] += FAR * _size(sim)
         sim.position = x

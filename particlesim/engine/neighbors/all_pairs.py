@@ -42,6 +42,11 @@ class AllPairs:
         self.for_interactions, self.for_constraints = np.zeros((2, model.world_count), dtype=bool)
         self.leader = np.zeros(model.world_count, dtype=int)  # see Neighbors
 
+    @property
+    def work(self) -> float:
+        """Pairs that a pass over it looks at."""
+        return float(((self.end_host - self.begin_host).astype(float) ** 2).sum())
+
     def request(self, names: set[str]) -> None:
         """Have these per-particle arrays ready in slot order at every update."""
         self.names |= names

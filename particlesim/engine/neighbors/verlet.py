@@ -136,6 +136,11 @@ class VerletList(AllPairs):
         self.struct.room = model.array(self.room, wp.int32)
 
     @property
+    def work(self) -> float:
+        """Pairs that are listed at present."""
+        return float(self.pairs.count.numpy().sum())
+
+    @property
     def capacity(self) -> int:
         """Neighbours that the longest rows have room for."""
         return int(self.room.max())

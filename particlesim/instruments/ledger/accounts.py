@@ -33,7 +33,7 @@ import warp as wp
 from ...engine.execution.launch import launch, owner
 from ...engine.loop import Loop
 from ...engine.model import Model, filled
-from ...engine.observers import FORCE, PROJECT, Observer
+from ...engine.observers import FOLLOW, FORCE, PROJECT, Observer
 from ...engine.state import State
 from ...kernels.engine.copy import copy_kernel, zero_kernel
 from ...kernels.instruments.ledger import TOTALS, account_kernel, change_kernel, ledger_type
@@ -105,7 +105,7 @@ class Accounts(Observer):
         mine = next(each for each in self.accounts if each.part is part)
         change = mine.early if stage == PROJECT else mine.late
         with owner("ledger"):
-            inputs = [self._changing(stage), self.seen, int(stage == PROJECT), change]
+            inputs = [self._changing(stage), self.seen, int(stage in (FOLLOW, PROJECT)), change]
             launch(change_kernel(self.model.precision), len(change), inputs, self.model.device)
 
     def end(self, dt: float) -> None:
@@ -127,7 +127,7 @@ class Accounts(Observer):
     def _changing(self, stage: str) -> wp.array:
         """What a part writes to."""
         state = self.state
-        if stage == FORCE:
+        if stage in (FORCE, FOLLOW):
             return state.force
         return state.correction if stage == PROJECT else state.velocity
 

@@ -23,6 +23,8 @@ from ... import validate
 from ...engine.model import Model
 from ...engine.neighbors.lists import Neighbors
 
+GROWN = 1.5  # times as fast as a round has seen: time for another
+SLOW = 0.02  # of the pace, below which speeds may grow as they like
 FINITE, ESCAPED, FAST = 1, 2, 3  # what may be wrong with a particle
 Scales = dict[str, np.ndarray]
 
@@ -45,7 +47,9 @@ class Limits:
             "lower": model.array(zeros.astype(real.numpy), real.vec3),
             "upper": model.array(zeros.astype(real.numpy), real.vec3),
             "speed": model.array(zeros[:, 0].astype(real.numpy), real.scalar),
+            "quick": model.array(zeros[:, 0].astype(real.numpy), real.scalar),
         }
+        self.met = np.zeros(worlds)  # the largest speeds that a round has seen
         self._write()
 
     def _check(self, x: np.ndarray) -> None:
@@ -112,6 +116,11 @@ class Limits:
             self.scales["pace"][w] = max(self.scales["pace"][w], speed)
         self._write()
 
+    def meet(self, speeds: np.ndarray) -> None:
+        """A round has seen such speeds, (worlds,): to be called for where they have grown."""
+        self.met = np.maximum(self.met, speeds)
+        self._write()
+
     def _write(self) -> None:
         """Limits from the scales."""
         model, settings = self.model, self.model.settings
@@ -122,11 +131,13 @@ class Limits:
             pace = np.fmax(pace, extent / settings.dt)
             far = np.fmax(self.resolved, 2.0 * farthest)[:, None]
             speed = np.sqrt(settings.energy_growth) * pace
+            quick = np.fmax(GROWN * self.met, SLOW * pace)
         far = np.where(model.box_length > 0, largest, np.fmin(far, largest))
         values = {
             "lower": np.maximum(self.corners[0], -far),
             "upper": np.minimum(self.corners[1], far),
             "speed": np.fmin(speed, largest),
+            "quick": np.fmin(quick, largest),
         }
         for name, value in values.items():
             self.arrays[name].assign(value.astype(model.precision.numpy))

@@ -2,10 +2,10 @@
 
 Has an energy that has grown a cause, or is it an artefact of the step? What the laws of a scene do
 does not depend on the substep. So the frame is done again with two and with four times the
-substeps, and the largest speeds of each world are compared: they agree where a spring is let go, a
-charge falls or a user's force pushes, and differ where the step is past its stability limit (each
-substep then multiplies the velocity) or where a force was met for one substep that no finer path
-meets (the speed is then in proportion to the substep).
+substeps, and what the largest speeds of each world have gained in it is compared: it agrees where a
+spring is let go, a charge falls or a user's force pushes, and differs where the step is past its
+stability limit (each substep then multiplies the velocity, however little a frame) or where a force
+was met for one substep that no finer path meets (the speed is then in proportion to the substep).
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ import numpy as np
 
 from ...engine.frames import Frames
 from ...engine.loop import Loop
-from ...engine.observers import FORCE, Observer
+from ...engine.observers import FOLLOW, FORCE, Observer
 from .limits import FAST, FINITE, Limits
 
 REFINEMENTS = (1, 2, 4)
-AGREE = np.sqrt(2.0)  # ratio of speeds, that is a factor of two in energy
+AGREE = 2.0  # ratio of the energies that are gained in a frame
 SHARE = 0.1  # of its velocity that a part must have added within the substep to have done it
 
 
@@ -118,7 +118,7 @@ class _Look(Observer):
         self.start = [self._push(each.row) for each in self.pending]
 
     def after(self, part: Any, stage: str) -> None:
-        self._see(part.name, ("force",) if stage == FORCE else ("position", "velocity"))
+        self._see(part.name, ("force",) if stage in (FORCE, FOLLOW) else ("position", "velocity"))
         with np.errstate(invalid="ignore", over="ignore"):
             for each, start, mine in zip(self.pending, self.start, self.pushes, strict=True):
                 mine[part.name] = mine.get(part.name, 0.0) + self._push(each.row) - start
@@ -168,6 +168,9 @@ def causes(frames: Frames, worlds: Iterable[int], substeps: int) -> dict[int, fl
     Starts from the last good frame, and leaves the state of its end after ``substeps``.
     """
     peaks = []
+    frames.snapshot.restore()
+    speeds = np.abs(frames.loop.get("velocity").astype(np.float64)).max(axis=1)
+    before = [_largest(speeds, frames.loop.model.rows(w)) for w in worlds]
     for refinement in REFINEMENTS:
         frames.snapshot.restore()
         peak = frames.peaks(refinement * substeps)
@@ -176,9 +179,13 @@ def causes(frames: Frames, worlds: Iterable[int], substeps: int) -> dict[int, fl
     frames.run(substeps)
     return {
         w: float(max(speeds))
-        for w, speeds in zip(worlds, np.transpose(peaks), strict=True)
-        if np.isfinite(speeds).all() and max(speeds) <= AGREE * min(speeds)
+        for w, speeds, first in zip(worlds, np.transpose(peaks), before, strict=True)
+        if np.isfinite(speeds).all() and _agree(speeds**2 - first**2)
     }
+
+
+def _agree(gained: np.ndarray) -> bool:
+    return bool(gained.min() > 0 and gained.max() <= AGREE * gained.min())
 
 
 def _largest(peak: np.ndarray, rows: slice) -> float:

@@ -34,13 +34,14 @@ SHOWN = ("density", "pressure")  # made anew in every substep, and shown to user
 class Watchdog:
     """Looks at every particle once a frame.
 
-    ``flag`` is one int on the device; ``frozen`` holds the worlds that stand still.
+    ``flag`` is two ints on the device, something is wrong and something is quicker than when it was
+    looked at; ``frozen`` holds the worlds that stand still.
     """
 
     def __init__(self, model: Model, neighbors: Neighbors):
         self.model, self.settings = model, model.settings
         self.limits = Limits(model, neighbors)
-        self.flag = wp.zeros(1, dtype=wp.int32, device=model.device)
+        self.flag = wp.zeros(2, dtype=wp.int32, device=model.device)
         # On the CPU the flag is the memory itself: a look needs no copy.
         self._seen = self.flag.numpy() if model.device.is_cpu else None
         size = BLOCK_CPU if model.device.is_cpu else BLOCK_CUDA
@@ -73,6 +74,12 @@ class Watchdog:
         """Something was wrong at the end of the frame."""
         seen = self.flag.numpy() if self._seen is None else self._seen
         return bool(seen[0])
+
+    @property
+    def hurried(self) -> bool:
+        """Something was quicker than the limits of the substep were last asked for."""
+        seen = self.flag.numpy() if self._seen is None else self._seen
+        return bool(seen[1])
 
     def forget(self) -> None:
         """What was seen is void: the frame is done again."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...engine.limit import Limit, explicit_step
+from ...engine.limit import Limit
 from ...engine.probe import Probe
 from .smoothing import SUPPORT, Smoothing
 from .viscosities import ArtificialViscosity
@@ -36,9 +36,9 @@ def fluid_limits(part: Any, probe: Probe) -> list[Limit]:
     h, c = each["smoothing_length"], part.sound_speeds(probe)
     omega = c * steepest(part.smoothing, part.dimension) / h
     gamma = _damping_rates(part, probe, each, c)
-    k = int(np.argmax(gamma + np.sqrt(gamma**2 + 4.0 * omega**2)))
+    k = int(np.argmax(gamma + np.sqrt(gamma**2 + 4.0 * omega**2)))  # by either integrator
     reason = f"h = {h[k]:.4g}, c = {c[k]:.4g}, omega = {omega[k]:.4g} /s, gamma = {gamma[k]:.4g} /s"
-    dt = explicit_step(float(omega[k]) ** 2, float(gamma[k]))
+    dt = probe.loop.integrator.largest_step(float(omega[k]) ** 2, float(gamma[k]))
     if c[k] > 0 and (advised := ADVISED * h[k] / c[k]) < dt:
         reason += f"; for accuracy {ADVISED} h / c = {advised:.3g} s is advised"
     limits = [Limit(part.name, "sound", dt, reason, *probe.place(int(rows[k])))]

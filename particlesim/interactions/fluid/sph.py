@@ -100,6 +100,8 @@ class SPH(Interaction):
             "Tait(sound_speed)",
         )  # fmt: skip
         self.viscosity = viscosity
+        self.reads_velocity = viscosity is not None
+        self.conservative = viscosity is None
         if viscosity is not None:
             _of_kind(self.name, "viscosity", viscosity, Viscosity, "ArtificialViscosity(0.05)")
         validate.choice(self.name, "smoothing", smoothing, SMOOTHING)

@@ -1,0 +1,183 @@
+"""Rounds: what the watchdog looks at only now and then, and tells once of each world.
+
+- Energy, where every force has a potential and nothing else acts: it may differ by ``DRIFT`` of the
+  largest kinetic energy so far.
+- Constraints: how far the particles of a tuple are off, |C + alpha F| / |grad C|, in
+  parts of how far they are apart; how deep grains are in each other and in boundaries, in parts of
+  their radius.
+- The limits of the substep, at the present state.
+
+What is found in two rounds that follow one another is told: a start from rest has no kinetic energy
+to compare with yet, and one that does not fit its constraints eases.
+
+A round takes as long as some hundred substeps of a small scene. It is made after 1, 2, 4, 8 ...
+frames, and from then on so seldom that it is under 2 % of the time, by a rule of the scene alone;
+and whenever something has become half as fast again. Nothing of the motion depends on it.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ...constraints.boundary import Boundary
+from ...constraints.constraint import Constraint
+from ...constraints.contact import Contact
+from ...engine.loop import Loop
+from ..diagnostics import measure, undisturbed
+from ..residuals import off, residuals
+from ..stability import warn_if_past
+from .incident import SimulationWarning
+from .limits import GROWN, Limits
+
+DRIFT = 0.1  # of the largest kinetic energy
+UNMET = 0.02  # of a tuple's extent
+DEEP = 0.2  # of a radius
+SHARE = 50  # times its own cost, from one round to the next
+ROUND = 6e6  # what a round costs beside three evaluations of the forces, in pairs of these
+SUBSTEP = 2e3  # and a substep beside one
+
+
+class Rounds:
+    """Of one loop.
+
+    Args:
+        loop: What is in motion.
+        limits: Of its speeds, by which the watchdog calls for a round.
+    """
+
+    def __init__(self, loop: Loop, limits: Limits):
+        self.loop, self.limits = loop, limits
+        self.made, self.next = -1, 0  # frames
+        self.kept = conserves(loop)
+        worlds = loop.model.world_count
+        self.start, self.fastest = np.full(worlds, np.nan), np.zeros(worlds)
+        self.off = np.zeros(worlds, dtype=bool)  # in the last round
+        self.told: set[tuple[Any, int]] = set()
+        self.missed: set[tuple[int, int]] = set()  # constraints and worlds, in the last round
+        self.met = np.zeros(2)  # the largest speed and acceleration, when limits were last asked
+
+    def begin_anew(self, worlds: Iterable[int]) -> None:
+        """These worlds were written from outside: their energy is another."""
+        self.start[list(worlds)] = np.nan
+
+    def due(self) -> bool:
+        """Whether it is time for a round."""
+        return self.loop.frame >= self.next or self.loop.frame < self.made
+
+    def make(self) -> None:
+        """Look, tell, and say when to look again."""
+        loop = self.loop
+        with np.errstate(all="ignore"):
+            if self.kept:
+                self._energy()
+            if loop.frame and loop.constraints:
+                self._constraints()
+        self._limits()
+        self.made = loop.frame
+        work, settings = loop.work, loop.settings
+        most = SHARE * (ROUND + 3.0 * work) / (settings.substeps * (SUBSTEP + work))
+        self.next = loop.frame + max(1, min(loop.frame, int(most) + 1))
+
+    def _limits(self) -> None:
+        """Asked again where the motion has become faster, or stronger; at the start by the run."""
+        state, model = self.loop.state, self.loop.model
+        speeds = np.zeros(model.world_count)
+        np.maximum.at(speeds, model.world_of, _lengths(state.velocity))
+        sizes = np.array([speeds.max(initial=0.0), 0.0])
+        if "force" in state:
+            sizes[1] = (_lengths(state.force) * state.inverse_mass.numpy()).max(initial=0.0)
+        self.limits.meet(speeds)
+        grown = (sizes > GROWN * self.met).any()
+        self.met = np.maximum(self.met, sizes)
+        if grown and self.loop.frame:
+            warn_if_past(self.loop, again=True)
+
+    def _energy(self) -> None:
+        now = measure(self.loop)
+        energy, fresh = now.energy, np.isnan(self.start)
+        self.start[fresh] = energy[fresh]
+        self.fastest[fresh] = 0.0
+        self.fastest = np.fmax(self.fastest, now.kinetic)
+        drift = np.abs(energy - self.start) / self.fastest
+        off = drift > DRIFT
+        for w in np.nonzero(off & self.off)[0].tolist():
+            self._tell(
+                "energy", w,
+                f"energy must stay within {DRIFT:.0%} of the largest kinetic energy, as all forces "
+                f"have potentials, got {energy[w]:.6g} after {self.start[w]:.6g}, off by "
+                f"{drift[w]:.2g} of it",
+                f"use more substeps than {self.loop.settings.substeps}"
+                + ("" if self.loop.integrator.order > 1 else ", or integrator='velocity_verlet'"),
+            )  # fmt: skip
+        self.off = off
+
+    def _constraints(self) -> None:
+        """Tell of what was missed in the last round, too."""
+        loop, missed = self.loop, set()
+        with undisturbed(loop):
+            loop.neighbors.update_for_constraints(loop.state)
+            loop.neighbors.grow()
+            for constraint in loop.constraints:
+                for worst, world, what, most in _unmet(constraint, loop):
+                    for w in np.unique(world[worst > most]).tolist():
+                        missed.add((id(constraint), w))
+                        if (id(constraint), w) in self.missed:
+                            size = f"{worst[world == w].max():.2g}"
+                            must = f"{constraint.name} must hold within {most:.0%} of {what}"
+                            remedy = "use more substeps or iterations, or see whether it can hold"
+                            self._tell(id(constraint), w, f"{must}, got {size} of it", remedy)
+        self.missed = missed
+
+    def _tell(self, about: Any, w: int, must: str, remedy: str) -> None:
+        if (about, w) in self.told:
+            return
+        self.told.add((about, w))
+        where = f" in world {w}" if self.loop.model.world_count > 1 else ""
+        warnings.warn(
+            f"Simulation: {must}{where} at t = {self.loop.time:g}; {remedy}.",
+            SimulationWarning, stacklevel=5,
+        )  # fmt: skip
+
+
+def _lengths(array: wp.array) -> np.ndarray:
+    """Lengths of vectors, (n,)."""
+    return np.linalg.norm(array.numpy().astype(np.float64), axis=1)
+
+
+def conserves(loop: Loop) -> bool:
+    """Whether nothing acts but forces that have a potential, which does not change in time."""
+    return (
+        bool(loop.interactions) and not loop.constraints
+        and all(each.conservative for each in loop.interactions)
+    )  # fmt: skip
+
+
+def _unmet(constraint: Any, loop: Loop) -> list[tuple[np.ndarray, np.ndarray, str, float]]:
+    """By how much it is off, in parts of what that is said of; the worlds; that; and how much
+    may be.
+    """
+    if isinstance(constraint, Constraint):
+        found = off(constraint, loop)
+        return [] if found is None else [(*found, "its particles' distance", UNMET)]
+    if not isinstance(constraint, Contact | Boundary):
+        return []
+    missed = residuals(constraint, loop)
+    if missed is None:
+        return []
+    depth, world = missed
+    slack = constraint.easing.slack.numpy()  # what a start overlaps by is called in slowly
+    if isinstance(constraint, Boundary):
+        rows = constraint.held.particle.numpy()
+        depth = depth - slack.reshape(len(rows), -1).max(axis=1)
+    else:
+        rows = constraint.pairs.pairs.order.numpy()
+        most = np.zeros(loop.model.world_count)
+        np.maximum.at(most, world, slack[rows])
+        depth = depth - slack[rows] - most[world]
+    radius = loop.get("radius").astype(np.float64)[rows]
+    return [(np.where(radius > 0, depth / radius, 0.0), world, "a radius", DEEP)]
