@@ -221,7 +221,7 @@ def project_kernel(law: Solved) -> wp.Kernel:
             else:
                 s += w[a] * wp.length_sq(G[a])
         lam = t.lam[r]
-        alpha = q.compliance * inverse_dt * inverse_dt * b.unit
+        alpha = q.compliance * inverse_dt * b.unit * inverse_dt  # in an order that stays in range
         gamma = q.compliance * q.damping * inverse_dt
         way = real(0.0)
         if gamma > real(0.0):

@@ -129,7 +129,7 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
         n = n * (real(1.0) - turned) + y * (turned / wp.sqrt(wp.where(through, y2, real(1.0))))
         r = wp.where(through, wp.dot(n, x_ij), r)
         share = both(d.share, i, j)
-        soft = share + p.compliance * d.inverse_dt * d.inverse_dt * d.unit
+        soft = share + p.compliance * d.inverse_dt * d.unit * d.inverse_dt
         active = touching and share > real(0.0)
         lam = wp.where(active, reach - r, real(0.0)) / wp.where(active, soft, real(1.0))
         result = n * lam

@@ -233,11 +233,20 @@ def sum_store(
 
 
 @functools.cache
-def values_kernel(law: wp.Function, names: tuple[str, ...], params: Any, returns: Any) -> wp.Kernel:
-    """Kernel: a law of double precision at given arguments, those of these names in ``params``."""
+def values_kernel(
+    law: wp.Function, names: tuple[str, ...], params: Any, returns: Any, by: int | None
+) -> wp.Kernel:
+    """Kernel: a law at given arguments, those of these names in ``params``; with ``by`` its
+    derivative by the argument of that number.
+    """
     call = ", ".join(f"p.{name}" for name in names)
-    source = f"def value(p: Params):\n    return law({call})\n"
-    value = function_from_source(source, {"law": law, "Params": params}, after_gradients=True)
+    lines = [f"return law({call})"]
+    if by is not None:
+        gradients = ", ".join(f"g{k}" for k in range(len(names)))
+        lines = [f"{gradients} = wp.grad(law)({call})", f"return g{by}"]
+    source = "\n    ".join(["def value(p: Params):", *lines, ""])
+    names_of = {"wp": wp, "law": law, "Params": params}
+    value = function_from_source(source, names_of, after_gradients=True)
 
     @functools.partial(register, cpu_only=True)
     def values_of_law(given: wp.array(dtype=params), out: wp.array(dtype=returns)):

@@ -180,6 +180,16 @@ class Constraint(ConstraintBase):
         self.model = model
         self.tuples = Tuples(self.name, model, self.peers)
         self.count = self.tuples.count
+        self._fit_compliance()
+
+    def _fit_compliance(self) -> None:
+        """What projection makes of the compliances is within the kernels' precision, too."""
+        model, dt = self.model, self.model.settings.substep
+        alpha = np.concatenate([peer.compliance for peer in self.peers])
+        if dt > 0:
+            once = alpha / dt
+            model.fits(self.name, {"compliance/dt": once})
+            model.fits(self.name, {"compliance/dt^2": once * model.mass_unit / dt})
 
     def attach(self, model: Model, state: State) -> None:
         if not self.count:

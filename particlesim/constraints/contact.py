@@ -101,8 +101,7 @@ class Contact(EasedConstraint):
         """That nothing can touch, where all are points, or that places are too coarse for radii."""
         members = self.members
         if self.count or len(members) < 2:
-            diameter = 2.0 * self.model.column("radius")[members]
-            return self.model.unresolved(self.name, "diameter", diameter, members)
+            return self.model.unresolved_radii(self.name, members)
         return (
             f"{self.name}: radius must be above 0 for particles to touch, got 0 for all "
             f"{len(members)}; give add_particles(..., radius=...)."

@@ -45,6 +45,8 @@ class Holding(EasedConstraint):
         ]
         columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         model.fits(self.name, columns)
+        radii = model.column("radius")[members]
+        model.squares_fit(self.name, "radius", np.concatenate([radii, model.apart()[0]]))
         self.Params, self.params = model.parameters(f"{type(self).__name__}Parameters", columns)
         self.rough, self.bouncing = columns["friction"].any(), columns["restitution"].any()
         self.moving = any(peer.moves for peer in self.peers)
@@ -95,8 +97,7 @@ class Holding(EasedConstraint):
 
     def complaint(self) -> str:
         """That places are too coarse for the radii."""
-        diameter = 2.0 * self.model.column("radius")[self.members]
-        return self.model.unresolved(self.name, "diameter", diameter, self.members)
+        return self.model.unresolved_radii(self.name, self.members)
 
     def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
         return self.worlds_held if name == "slack" else super().worlds(name, array)

@@ -160,20 +160,28 @@ class Model:
         """Refuse lengths whose squares the kernels' precision cannot hold."""
         ranges.squares_fit(owner, name, lengths, self.precision.numpy)
 
-    def unresolved(self, owner: str, name: str, lengths: Any, rows: np.ndarray) -> str:
+    def unresolved(
+        self, owner: str, name: str, lengths: Any, rows: np.ndarray, part: float = ranges.COARSE
+    ) -> str:
         """What is to be said of lengths that start positions are too coarse for, or nothing.
 
         Args:
             owner: Whose lengths. name: What they are.
             lengths: One for all, or (m,) [length].
             rows: Of the particles that go with them, (m,) or (m, k).
+            part: Of a length, what numbers may be apart unasked.
         """
         if not len(rows):
             return ""
         x, _ = self.wrapped(self.column("position"), self.world_of)
         far = np.abs(x).max(axis=1)[rows.reshape(len(rows), -1)].max(axis=1)
         lengths = np.broadcast_to(np.asarray(lengths, dtype=np.float64), far.shape)
-        return ranges.unresolved(owner, name, lengths, far, self.precision.numpy)
+        return ranges.unresolved(owner, name, lengths, far, self.precision.numpy, part)
+
+    def unresolved_radii(self, owner: str, rows: np.ndarray) -> str:
+        """The same of the diameters of these particles, which contacts go by."""
+        diameter = 2.0 * self.column("radius")[rows]
+        return self.unresolved(owner, "diameter", diameter, rows, ranges.COARSE_DIAMETER)
 
     @functools.cached_property
     def mass_unit(self) -> float:

@@ -17,29 +17,30 @@ REMEDY = "choose other units, or Settings(precision='float64')"
 # Lengths that lie so many times within the roots of the smallest and the largest normal number have
 # squares with all their digits, and so have sums of a few of them.
 ROOM = 4.0
-COARSE = 1.0 / 64.0  # of a length: what neighbouring numbers may be apart unasked
+# What neighbouring numbers may be apart unasked, in parts of a length; of a diameter, as contacts
+# see places with what rounding has kept from them: only the start is rounded.
+COARSE, COARSE_DIAMETER = 1.0 / 64.0, 1.0 / 5.0
 
 
 def fits(owner: str, columns: Mapping[str, np.ndarray], kind: Any) -> None:
-    """Refuse numbers that become infinite in a precision, masses that become 0, and parameters of
-    which nothing is left; what is little beside others may well be nothing.
+    """Refuse numbers that become infinite in a precision, masses of which nothing is left, and
+    parameters of all of which but few digits are; what is little beside others may well be nothing.
     """
+    numbers = np.finfo(kind)
     for name, column in columns.items():
         given = np.asarray(column, dtype=np.float64)
         with np.errstate(over="ignore", under="ignore"):
             kept = given.astype(kind)
         lost = np.isfinite(given) & ~np.isfinite(kept)
-        if name == "mass" or (name not in ("position", "velocity") and not kept.any()):
-            lost |= (kept == 0) & (given != 0)
+        if name not in ("position", "velocity", "mass"):
+            lost |= (given != 0) & (np.abs(kept).max(initial=0.0) < numbers.tiny)
         if name == "mass":
-            with np.errstate(over="ignore", divide="ignore"):
+            with np.errstate(over="ignore", divide="ignore"):  # the inverse of 0, too
                 lost |= ~np.isfinite((1.0 / given).astype(kind))
         if lost.any():
-            numbers = np.finfo(kind)
             raise validate.fail(
                 owner, name,
-                f"be within {np.dtype(kind)}, about {numbers.smallest_subnormal:.0e} to "
-                f"{numbers.max:.0e}",
+                f"be within {np.dtype(kind)}, about {numbers.tiny:.0e} to {numbers.max:.0e}",
                 float(given[tuple(np.argwhere(lost)[0])]), REMEDY,
             )  # fmt: skip
 
@@ -78,20 +79,22 @@ def step_fits(step: float, kind: Any) -> None:
         )
 
 
-def unresolved(owner: str, name: str, lengths: np.ndarray, x: np.ndarray, kind: Any) -> str:
+def unresolved(
+    owner: str, name: str, lengths: np.ndarray, x: np.ndarray, kind: Any, part: float
+) -> str:
     """What is to be said of lengths that places are too far from the origin for; empty if nothing.
 
-    Near x numbers are ``spacing(x)`` apart, and places are rounded to them. Said where that is more
-    than a 64th of a length.
+    Near x numbers are ``spacing(x)`` apart, and places are rounded to them.
 
     Args:
         owner: Whose lengths. name: What they are.
         lengths: (m,) [length]; 0 says nothing.
         x: (m,) the largest coordinates that go with them [length].
         kind: The precision's number.
+        part: Of a length, what numbers may be apart unasked.
     """
     apart = np.spacing(np.abs(x).astype(kind)).astype(np.float64)
-    coarse = (lengths > 0) & (apart > COARSE * lengths)
+    coarse = (lengths > 0) & (apart > part * lengths)
     if not coarse.any():
         return ""
     k = int(np.argmax(np.where(coarse, apart / np.where(coarse, lengths, 1.0), 0.0)))

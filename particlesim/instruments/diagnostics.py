@@ -70,12 +70,20 @@ def measure(sim: Source, potentials: list[np.ndarray] | None = None) -> Diagnost
             (worlds,).
     """
     found = _measure(sim, sim, potentials)
-    whole = np.isfinite(found.energy).all() and np.isfinite(found.virial).all()
-    if not whole and sim.model.precision is not FLOAT64 and np.isfinite(sim.get("position")).all():
+    if _overflows(sim, found):
         if potentials is not None:
             potentials.clear()
         found = _measure(sim, _doubled(sim), potentials)
     return found
+
+
+def _overflows(sim: Source, found: Diagnostics) -> bool:
+    """Whether energies are not finite where the motion is, in single precision."""
+    if np.isfinite(found.energy).all() and np.isfinite(found.virial).all():
+        return False
+    unchanged = sum(scene.particle_count for scene in sim.scenes) == sim.model.particle_count
+    finite = all(np.isfinite(sim.state[name].numpy()).all() for name in ("position", "velocity"))
+    return unchanged and finite and sim.model.precision is not FLOAT64
 
 
 _doubles: weakref.WeakKeyDictionary[Model, Loop] = weakref.WeakKeyDictionary()

@@ -14,8 +14,7 @@ from .trial import of_pairs, of_particles, quantity
 
 TRIES = 32  # particles, or pairs, that a law is asked of
 AWAY = 0.1  # of the scene's size: how far from the particles a law is asked, too
-STEP = 1e-6  # of a length, for differences in double precision
-OFF = 1e-3  # of the largest force: more than rounding of differences, and a jump that is told
+OFF = 1e-3  # of the largest force: more than rounding of two laws, and a jump that is told
 # Of the largest value: more than rounding, less than a product that leaves the precision.
 LOST = 1e-2
 ORDINARY = 1e9  # products of four such numbers, or their inverses, are within single precision
@@ -33,10 +32,10 @@ def of_particle_force(part: Any) -> str:
     start = model.column("position")
     size = float(np.ptp(start, axis=0).max()) or float(np.abs(start).max()) or 1.0
     x = start[rows] + AWAY * size * rng.uniform(-1.0, 1.0, (TRIES, 3))
-    return _of_potential(part, rows, x, size) or _of_particle_range(part, rows, x)
+    return _of_potential(part, rows, x) or _of_particle_range(part, rows, x)
 
 
-def _of_potential(part: Any, rows: np.ndarray, x: np.ndarray, size: float) -> str:
+def _of_potential(part: Any, rows: np.ndarray, x: np.ndarray) -> str:
     """f = -dU/dx is tried near the particles there are.
 
     Nothing is said of laws of the velocity, whose force may well do work beside the potential's.
@@ -44,22 +43,19 @@ def _of_potential(part: Any, rows: np.ndarray, x: np.ndarray, size: float) -> st
     if part.law is None or part.potential is None:
         return ""
     force, potential = part.arguments
-    if "velocity" in part.quantities or "position" not in part.quantities:
+    if "velocity" in part.quantities or "position" not in potential.quantities:
         return ""
-    f = of_particles(force, part.model, rows, x, vector=True)
-    ahead, behind = (
-        [
-            of_particles(potential, part.model, rows, x + way * side, vector=False)
-            for side in STEP * size * np.eye(3)
-        ]
-        for way in (1.0, -1.0)
-    )
-    slope = np.subtract(ahead, behind).T / (2.0 * STEP * size)
-    known = np.isfinite(f).all(axis=1) & np.isfinite(slope).all(axis=1)
+    try:
+        part.potential.check_derivable(part.name)
+    except ValueError:  # a law of the force is given for that
+        return ""
+    f = of_particles(force, part.model, rows, x)
+    other = of_particles(potential, part.model, rows, x, derived=True)
+    known = np.isfinite(f).all(axis=1) & np.isfinite(other).all(axis=1)
     if not known.any():
         return ""
-    off = float(np.linalg.norm(f + slope, axis=1)[known].max())
-    scale = max(float(np.linalg.norm(each[known], axis=1).max()) for each in (f, slope))
+    off = float(np.linalg.norm(f - other, axis=1)[known].max())
+    scale = max(float(np.linalg.norm(each[known], axis=1).max()) for each in (f, other))
     if not off > OFF * scale:
         return ""
     return (
@@ -75,10 +71,8 @@ def _of_particle_range(part: Any, rows: np.ndarray, x: np.ndarray) -> str:
     if not _extraordinary(part.model, [x, *columns, *arguments.values.values()]):
         return ""
     kept, true = (
-        of_particles(
-            arguments, part.model, rows, x, vector=part.law is not None, precision=precision
-        )
-        for precision in (part.model.precision, FLOAT64)
+        of_particles(arguments, part.model, rows, x, derived=part.law is None, precision=each)
+        for each in (part.model.precision, FLOAT64)
     )
     return _lost(part, arguments, kept, true)
 
@@ -109,13 +103,7 @@ def _of_box(part: Any, pairs: dict[str, np.ndarray], count: int) -> str:
     arguments = part.arguments[-1]
 
     def force(r: float) -> float:
-        if part.force is not None:
-            f = of_pairs(arguments, np.full(TRIES, r), pairs)
-        else:
-            ahead, behind = (
-                of_pairs(arguments, np.full(TRIES, r + way * STEP * r), pairs) for way in (1, -1)
-            )
-            f = (ahead - behind) / (2.0 * STEP * r)
+        f = of_pairs(arguments, np.full(TRIES, r), pairs, derived=part.force is None)
         return float(np.abs(f[np.isfinite(f)]).max(initial=0.0))
 
     there, here = force(half), force(near)
@@ -141,7 +129,8 @@ def _of_pair_range(
     if not r.all() or not _extraordinary(model, [r, *pairs.values(), *arguments.values.values()]):
         return ""
     kept, true = (
-        of_pairs(arguments, r, pairs, precision=each) for each in (model.precision, FLOAT64)
+        of_pairs(arguments, r, pairs, derived=part.force is None, precision=each)
+        for each in (model.precision, FLOAT64)
     )
     return _lost(part, arguments, kept, true)
 

@@ -48,7 +48,7 @@ def is_symmetric(
     off = {name: _off(name, each, rng) for name, each in there.items()}
     pairs = {name: np.concatenate([there[name], off[name]]) for name in columns}
     r = np.tile(r, 2)
-    ours, theirs = (of_pairs(arguments, r, pairs, order) for order in ("ij", "ji"))
+    ours, theirs = (of_pairs(arguments, r, pairs, order=order) for order in ("ij", "ji"))
     known = np.isfinite(ours) & np.isfinite(theirs)
     ours, theirs = ours[known], theirs[known]
     return bool((np.abs(ours - theirs) <= ROUNDING * (np.abs(ours) + np.abs(theirs))).all())

@@ -15,7 +15,7 @@ from .arguments import QUANTITIES, Arguments
 
 def values(
     arguments: Arguments, given: Mapping[str, np.ndarray], count: int, *, vector: bool = False,
-    precision: Precision = FLOAT64,
+    by: str | None = None, precision: Precision = FLOAT64,
 ) -> np.ndarray:  # fmt: skip
     """A law's values in a precision, (k,) or of a law of vectors (k, 3), as float64.
 
@@ -23,7 +23,8 @@ def values(
         arguments: Of the law.
         given: The law's parameters by name, (k,) or (k, 3); those left out have their own values.
         count: k.
-        vector: It is a law of vectors.
+        vector: They are vectors.
+        by: The parameter by which the law is to be derived; None: not at all.
         precision: In which it is computed.
     """
     law = arguments.law
@@ -35,7 +36,8 @@ def values(
         for name in kinds:
             host[name] = given[name] if name in given else arguments.values[name]
     returns = precision.vec3 if vector else precision.scalar
-    kernel = values_kernel(law.function(precision), tuple(kinds), Params, returns)
+    at = None if by is None else list(kinds).index(by)
+    kernel = values_kernel(law.function(precision), tuple(kinds), Params, returns, at)
     found = wp.empty(count, dtype=returns, device="cpu")
     wp.launch(kernel, count, [wp.array(host, dtype=Params, device="cpu")], [found], device="cpu")
     return found.numpy().astype(np.float64)
@@ -49,37 +51,41 @@ def quantity(model: Model, rows: np.ndarray, name: str) -> np.ndarray:
 
 
 def of_pairs(
-    arguments: Arguments, r: np.ndarray, pairs: Mapping[str, np.ndarray], order: str = "ij",
-    precision: Precision = FLOAT64,
+    arguments: Arguments, r: np.ndarray, pairs: Mapping[str, np.ndarray], *, order: str = "ij",
+    derived: bool = False, precision: Precision = FLOAT64,
 ) -> np.ndarray:  # fmt: skip
-    """A pair's law at distances r.
+    """A pair's law at distances r, or minus its derivative: the force of a potential.
 
     Args:
         arguments: Of the law, the distance left out.
         r: (k,) [length].
         pairs: Quantities of both by name, (k, 2) or (k, 2, 3).
         order: What the first and the second particle are called.
+        derived: By the distance.
         precision: In which it is computed.
     """
-    given = {next(iter(arguments.law.parameters)): r}
+    distance = next(iter(arguments.law.parameters))
+    given = {distance: r}
     for name, (kind, source) in zip(arguments.names, arguments.sources, strict=True):
         if kind != "parameter":
             given[name] = pairs[source][:, order.index(kind[-1])]
-    return values(arguments, given, len(r), precision=precision)
+    by = distance if derived else None
+    found = values(arguments, given, len(r), by=by, precision=precision)
+    return -found if derived else found
 
 
 def of_particles(
-    arguments: Arguments, model: Model, rows: np.ndarray, x: np.ndarray, *, vector: bool,
+    arguments: Arguments, model: Model, rows: np.ndarray, x: np.ndarray, *, derived: bool = False,
     precision: Precision = FLOAT64,
 ) -> np.ndarray:  # fmt: skip
-    """A particle's law as these particles would feel it at x, at the start.
+    """The force on particles by a law of it, or by that of a potential, as if they were at x.
 
     Args:
         arguments: Of the law.
         model: With the particles.
         rows: Which, (k,).
         x: Where, (k, 3) [length].
-        vector: It is a law of vectors.
+        derived: It is the law of a potential, which takes ``position``.
         precision: In which it is computed.
     """
     given = {
@@ -87,4 +93,6 @@ def of_particles(
         for name, (kind, source) in zip(arguments.names, arguments.sources, strict=True)
         if kind != "parameter"
     }
-    return values(arguments, given, len(rows), vector=vector, precision=precision)
+    by = "position" if derived else None
+    found = values(arguments, given, len(rows), vector=True, by=by, precision=precision)
+    return -found if derived else found

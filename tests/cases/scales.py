@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+import warp as wp
 
 import particlesim as ps
 
@@ -152,16 +153,69 @@ def rigid(u):
     return scene
 
 
+@ps.law
+def bend(a: wp.vec3, b: wp.vec3, c: wp.vec3, cosine: float):
+    return wp.dot(wp.normalize(a - b), wp.normalize(c - b)) - cosine
+
+
+def angle(u):
+    scene = particles(u, TRIANGLE, SPIN, mass=(1.0, 2.0, 1.5))
+    scene.add_constraint(
+        ps.Constraint(bend, [(0, 1, 2)], cosine=0.5, compliance=0.2 / u.of(2, 1, -2))
+    )
+    return scene
+
+
+def penalty(u):
+    scene = particles(u, TRIANGLE, SPIN, mass=(1.0, 2.0, 1.5))
+    rods = ps.Distance(
+        [(0, 1), (1, 2), (0, 2)], 1.0 * u.length, compliance=0.2 * u.of(mass=-1, time=2),
+        damping=0.1 * u.of(mass=1, time=-1),
+    )  # fmt: skip
+    scene.add_interaction(rods.as_force())
+    return scene
+
+
+def walls(u):
+    """Two balls that fall onto a floor and along a wall, with friction, and bounce."""
+    scene = particles(u, [(0.31, 0.43, 0), (1.13, 0.37, 0.02)], [(-0.83, 0, 0.3), (0.7, -0.5, 0.1)],
+                      mass=(1.0, 2.0), radius=0.2)  # fmt: skip
+    scene.add_interaction(ps.UniformGravity(np.array((0, -1, 0)) * u.of(length=1, time=-2)))
+    scene.add_constraint(
+        ps.BoxBoundary(
+            np.array((0, 0, -9)) * u.length, np.full(3, np.inf), friction=0.3, restitution=0.5
+        )
+    )  # fmt: skip
+    scene.add_constraint(
+        ps.SphereBoundary(np.array((2.0, 0.3, 0)) * u.length, 0.4 * u.length, inside=False)
+    )
+    return scene
+
+
+def gas(u):
+    side = 3 * 1.7 * u.length
+    scene = ps.Scene(periodic=((0, 0, 0), (side, side, side)))
+    x = ps.sample.lattice("sc", (3, 3, 3), 1.7)
+    v = 0.7 * np.sin(5.0 * x[:, ::-1])
+    scene.add_particles(x * u.length, velocity=v * u.of(length=1, time=-1), mass=u.mass)
+    energy = u.of(2, 1, -2)
+    scene.add_interaction(ps.LennardJones(epsilon=energy, sigma=u.length, cutoff=2.5 * u.length))
+    return scene
+
+
 VERLET = {"substeps": 10, "integrator": "velocity_verlet"}
 KNOBS = {
     soft: {"substeps": 10},
     rigid: {"substeps": 10},
+    angle: {"substeps": 10},
+    walls: {"substeps": 2},
     # Friction goes by the overlap of one substep, which positions of single precision have to
     # eps / (v h): here 1e-7 / 0.02.
     contact: {"substeps": 2},
 }
 PARTS = {each.__name__: each for each in (
     lennard_jones, law_of_powers, charges, gravity, springs, drag, fluid, contact, soft, rigid,
+    angle, penalty, walls, gas,
 )}  # fmt: skip
 
 
@@ -172,6 +226,6 @@ def motion(part, units, precision):
     x, energy = [], []
     for _ in range(FRAMES):
         sim.run(1)
-        x.append(sim.position.astype(float) / units.length)
+        x.append(sim.state.unwrapped() / units.length)
         energy.append(sim.diagnostics().energy[0] / units.of(2, 1, -2))
     return np.array(x), np.array(energy)

@@ -152,6 +152,21 @@ def energy_kept(part=0.1, least=0.0):
     return miss
 
 
+def trend_kept(part=0.1, least=0.0):
+    """Off in the mean energy of the last quarter from that of the first, as :func:`energy_kept`.
+
+    What a method of steps this large makes swing, but keeps, is left out.
+    """
+
+    def miss(done):
+        energy, scale = done.energy, max(done.kinetic.max(), least)
+        quarter = max(1, len(energy) // 4)
+        change = energy[-quarter:].mean(axis=0) - energy[:quarter].mean(axis=0)
+        return whole(np.abs(change).max() / (part * scale))
+
+    return miss
+
+
 def momentum_kept(part=0.1):
     """Off in momentum, by parts of the largest that any particle has."""
 
