@@ -169,13 +169,24 @@ def transient(series: Any) -> int | None:
     count = len(x) // batch
     if count < 4:
         return 0
-    x = x[len(x) - count * batch :].reshape(count, batch).mean(axis=1)
+    over = len(x) - count * batch  # too few for a batch: of the beginning, and left out
+    x = x[over:].reshape(count, batch).mean(axis=1)
     x = (x - x.mean())[::-1]  # sums from the end are over what is left
     left = np.arange(1, count + 1)
     squares = np.cumsum(x**2) - np.cumsum(x) ** 2 / left
     least = (squares / left**2)[::-1][: count // 2 + 1]
     out = int(np.argmin(least))
-    return None if out == count // 2 else out * batch
+    return None if out == count // 2 else over + out * batch
+
+
+def drift(series: Any) -> Mean:
+    """The mean of the second half less that of the first; of (k, n), row by row."""
+    x = np.asarray(series, dtype=np.float64)
+    half = x.shape[-1] // 2
+    first, second = x[..., :half], x[..., half:]
+    if x.ndim > 1:
+        return independent(second.mean(axis=1) - first.mean(axis=1))
+    return difference(mean(second), mean(first))
 
 
 def median(values: Any, confidence: float = 0.95) -> tuple[float, Interval]:
