@@ -46,7 +46,10 @@ class Aim:
 
     def level(self, k: int) -> Level:
         """The k-th refinement in time: substeps doubled k times."""
-        plan = self.plan(self.coarsest * 2**k)
+        return self.level_of(self.plan(self.coarsest * 2**k))
+
+    def level_of(self, plan: Plan) -> Level:
+        """A level in time, of samples or of one long run."""
         kind = Series if self.bench.steady and not self.bench.chance else Level
         return kind(self.bench, plan, plan.settings.substep)
 
@@ -60,7 +63,7 @@ class Aim:
         for k in FINE:
             sim = self.bench.open(self.plan(self.coarsest * 2**k), [0])
             for _ in range(frames):
-                sim.step()
+                self.bench.step(sim, "time")
             sim.close()
             ends.append(sim.position.astype(np.float64))
         changes = np.array([rms(nearest(sim, b - a)) for a, b in itertools.pairwise(ends)])

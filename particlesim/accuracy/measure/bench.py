@@ -122,20 +122,24 @@ class Bench:
 
     def advance(self, sim: Simulation, frames: int, part: str) -> np.ndarray:
         """Run, and what is observed, (m, worlds): the start and every frame, or the end only."""
-        spent, rows = self.spent[part], []
+        rows = []
         if self.over is not final and sim.frame == 0:
             rows.append(self._look(sim))
         for frame in range(frames):
-            self._keep_budget(part)
-            begin = time.process_time()
-            sim.step()
-            spent.seconds += time.process_time() - begin
-            spent.substeps += sim.settings.substeps * sim.particle_count
-            if sim.frozen:
-                raise SimulationError(f"world {sim.frozen[0]} froze at t = {sim.time:g}")
+            self.step(sim, part)
             if self.over is not final or frame == frames - 1:
                 rows.append(self._look(sim))
         return np.array(rows)
+
+    def step(self, sim: Simulation, part: str) -> None:
+        """Run one frame, and keep account of it."""
+        self._keep_budget(part)
+        spent, begin = self.spent[part], time.process_time()
+        sim.step()
+        spent.seconds += time.process_time() - begin
+        spent.substeps += sim.settings.substeps * sim.particle_count
+        if sim.frozen:
+            raise SimulationError(f"world {sim.frozen[0]} froze at t = {sim.time:g}")
 
     def _look(self, sim: Simulation) -> np.ndarray:
         value = read(self.observe, sim)

@@ -20,6 +20,7 @@ from .richardson import LEAST
 HALF = 0.5  # of a correction is made, as averages may converge at a higher order than positions
 DOUBT = 0.6  # of a correction is left unsure: so that all of it, and none, are within
 FINEST = 8  # level, at most
+REMEDY = "allow a larger error, or observe another average"
 AGREE = 4.0  # standard errors by which averages at two levels may differ
 
 
@@ -53,24 +54,29 @@ class Averages:
 
     def __init__(self, make: Callable[[int], Level], levels: list[Level], order: float):
         self.make, self.levels, self.order = make, levels, order
+        self.next = len(levels)
 
     def settle(self) -> None:
-        """Hold the order against how the changes of the first three levels fall.
+        """Hold the order against how the changes of three levels fall, from where they do.
 
         Raises:
-            ValueError: They do not.
+            ValueError: They never do.
         """
-        coarse, fine, finer = self.levels
-        while math.inf in (level.mean.error for level in self.levels) and coarse.amount < SAMPLES:
-            for level in self.levels:
-                level.more(2 * level.amount, "chance")
-        one, two = fine.above(coarse), finer.above(fine)
-        if not agree(self.levels):
-            got = f"changes of averages of {one.value:.3g}, {two.value:.3g}"
-            raise validate.fail(
-                OWNER, "time", "converge", got,
-                "start from more substeps",
-            )  # fmt: skip
+        while True:
+            while math.inf in (each.mean.error for each in self.levels):
+                self._check_samples(2 * self.levels[0].amount)
+                for level in self.levels:
+                    level.more(2 * level.amount, "chance")
+            one, two = (b.above(a) for a, b in itertools.pairwise(self.levels))
+            if agree(self.levels):
+                break
+            if self.next > FINEST:
+                raise validate.fail(
+                    OWNER, "time", "converge",
+                    f"changes of averages of {one.value:.3g}, {two.value:.3g}", REMEDY,
+                )  # fmt: skip
+            self.levels = [*self.levels[1:], self._finer()]
+            self.levels[-1].more(self.levels[0].amount, "time")
         if all(abs(each.value) > each.reach() for each in (one, two)):
             found = math.log2(max(abs(one.value / two.value), 1.0))
             self.order = min(self.order, max(found, LEAST))
@@ -86,7 +92,7 @@ class Averages:
             for level in self.levels[:2]:
                 level.more(enlarged(level.amount, pilot) if pilot > level.amount else 0, "time")
             while len(self.levels) <= index:
-                self.levels.append(self.make(len(self.levels)))
+                self.levels.append(self._finer())
             level = self.levels[index]
             level.more(enlarged(level.amount or PILOT, wanted), "chance")
             level.bench.leave_out(level.history)
@@ -94,6 +100,17 @@ class Averages:
             if found.mean.reach(confidence) + found.unsure <= allowed:
                 self._compare(found)
                 return found
+
+    def _finer(self) -> Level:
+        """The next level."""
+        self.next += 1
+        return self.make(self.next - 1)
+
+    def _check_samples(self, count: int) -> None:
+        if count > SAMPLES:
+            raise validate.fail(
+                OWNER, "chance", f"be told from {SAMPLES} samples", "more", "observe what settles"
+            )
 
     def step_for(self, bias: float, confidence: float) -> float:
         """The step whose bias is no larger than that, for all that chance may hide."""
@@ -163,6 +180,5 @@ class Averages:
         if gap > AGREE * spread:
             raise validate.fail(
                 OWNER, "time", f"converge at order {self.order:g} as short runs do",
-                f"averages {gap / spread:.2g} standard errors apart at two steps",
-                "start from more substeps",
+                f"averages {gap / spread:.2g} standard errors apart at two steps", REMEDY,
             )  # fmt: skip

@@ -17,6 +17,7 @@ PILOT = 5  # seeds that every level is run with
 SAMPLES = 100_000  # of a level, at most
 GROWTH = 4  # times as many in one go, at most
 FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 32.0, 64.0)  # as many, to choose from
+LEAST = 0.05  # of those that there are, in one go
 NEXT = 0.7  # of what seems to be missing, in one go: what scatters may scatter less than it seems
 
 
@@ -146,7 +147,7 @@ def certain(value: float) -> Mean:
 
 def enlarged(have: int, wanted: float) -> int:
     """How many samples to have next, on the way to those that are wanted."""
-    return math.ceil(have + min(max(NEXT * (wanted - have), 1.0), GROWTH * have))
+    return math.ceil(have + min(max(NEXT * (wanted - have), LEAST * have), GROWTH * have))
 
 
 def needed(level: Level, reach: float, confidence: float) -> int:

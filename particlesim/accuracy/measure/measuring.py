@@ -153,7 +153,8 @@ def _resolution(study: Study, space: str | None) -> tuple[str, Any] | None:
     """The option that says how fine the scene is, and its value."""
     options = {**options_of(study.build), **study.options}
     if space == "auto":
-        space = next((name for name in RESOLUTIONS if name in options), None)
+        known = (name for name in RESOLUTIONS if isinstance(options.get(name), int | float))
+        space = next(known, None)
     if space is None:
         return None
     validate.choice(OWNER, "space", space, options)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from ...instruments.watchdog.incident import SimulationError
@@ -28,23 +29,24 @@ class Rounded:
 
 
 def round_off(aim: Aim, coarsest: Level, substeps: int) -> Rounded:
-    """Run the coarsest level in float32; rounding goes with the last bit, and with substeps.
+    """Run the coarsest level in float32.
+
+    Rounding goes with the last bit, and at random with each substep: with the root of how many.
 
     Args:
         aim: What is wanted.
         coarsest: In float64.
         substeps: Of a plain run.
     """
-    single = aim.level(0)
     settings = coarsest.plan.settings
-    single.plan = aim.plan(settings.substeps, precision="float32")
+    single = aim.level_of(aim.plan(settings.substeps, precision="float32"))
     try:
         single.more(min(PILOT, coarsest.amount), "round-off")
     except SimulationError as error:
         return Rounded(0.0, "float64", f"float32 fails: {error}")
     change = single.above(coarsest)
     hidden = abs(change.value) <= change.reach(aim.confidence)
-    most = abs(change.value) * max(1.0, substeps / settings.substeps)
+    most = abs(change.value) * math.sqrt(max(1.0, substeps / settings.substeps))
     enough = hidden or most <= SAME * aim.error
     how = f"float32 differs by {abs(change.value):.2g}"
     return Rounded(

@@ -21,7 +21,7 @@ from .richardson import Limit
 
 PLAIN = 0.9  # of the error, for the step of a plain run where there is nothing else
 SURE = 0.3  # of the error, for what is refined, where others are to have their share
-DOUBLINGS = 8  # of the frames, at most, until a steady state is seen
+DOUBLINGS = 6  # of the frames, at most, until a steady state is seen
 SAFE = 4.0  # times less than what leaving out every second frame changes: a cubic makes it 16
 
 
