@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from particlesim.accuracy.reference import settled
+from particlesim.accuracy.observe import observable
+from particlesim.accuracy.refining import settled
 from particlesim.accuracy.study import Study
+from particlesim.accuracy.tune.bench import Bench
 from particlesim.accuracy.tune.report import line
-from particlesim.accuracy.tune.search import Bench
 
 
 def oscillator(seed=0):
@@ -40,12 +41,14 @@ def tuned(error=1e-3, build=oscillator, **arguments):
 def test_reference_is_exact_to_a_tenth_of_the_tolerance():
     study = Study("test", oscillator, ps.Settings(dt=0.1), frames=4, device="cpu")
     for integrator in ("symplectic_euler", "velocity_verlet"):
-        x = settled(study, {"substeps": 4, "integrator": integrator}, 1e-3)
-        # Of two particles one is exact: rms over both.
-        assert abs(x[1, 0] - (1 + 0.2 * math.cos(4.0))) / math.sqrt(2) < 1e-4
+        seen = [observable("test", "position")]
+        found = settled(study, {"substeps": 4, "integrator": integrator}, 1e-3, seen)
+        x = found.values[0][0][-1]
+        assert abs(x[1, 0] - (1 + 0.2 * math.cos(4.0))) < 1e-4
+        assert found.own_error < 1e-4
 
 
-def test_a_reference_that_does_not_settle_says_so():
+def test_a_reference_that_does_not_settle_is_refused(refused):
     rng = np.random.default_rng(0)
 
     def chaos():
@@ -55,8 +58,8 @@ def test_a_reference_that_does_not_settle_says_so():
         return scene
 
     study = Study("test", chaos, ps.Settings(dt=0.1), frames=2, device="cpu")
-    with pytest.warns(UserWarning, match="must change by less than"):
-        settled(study, {"substeps": 2}, 1e-6)
+    with refused("reference must be known to 1e-07, a tenth of the tolerance"):
+        settled(study, {"substeps": 2}, 1e-6, [observable("test", "position")])
 
 
 # tune
@@ -147,7 +150,7 @@ def test_what_cannot_be_met_is_refused(refused):
 
 def test_the_bench_tries_a_setting_once():
     study = Study("test", oscillator, ps.Settings(dt=0.1), frames=4, device="cpu")
-    bench = Bench([study], swung, [None])
+    bench = Bench(study, swung)
     first = bench.trial({"substeps": 5})
     assert bench.trial({"substeps": 5}) is first and len(bench.trials) == 1
     failed = bench.trial({"substeps": 1, "dt": 0.4})  # omega h = 4

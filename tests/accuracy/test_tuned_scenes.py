@@ -5,7 +5,7 @@ import importlib
 import pytest
 
 import particlesim as ps
-from particlesim.accuracy.reference import settled
+from particlesim.accuracy.refining import settled
 from particlesim.accuracy.study import Study
 
 # Scene: tolerance, frames, options, and what makes another of the same kind. Small and short, so
