@@ -11,7 +11,7 @@ import numpy as np
 from .. import validate
 from ..scene.settings import Settings
 from .judges import Judge
-from .observe import WORDS, Observable, Series, World, observable
+from .observe import WORDS, Apart, Observable, Series, World, observable
 from .reference import Reference
 from .refining import SHARE, Refining
 from .run import Run
@@ -194,7 +194,10 @@ class Converged(Judge):
             ]
             found = [reference.apart(values, k) for k in range(len(self.observables))]
             run.settle([each.rms for each in found[0]])
-            run.parts["worst"] = float(np.median([each.worst for each in found[0]]))
+            if reference.values[0][0][0].size > 1:
+                run.parts["worst"] = float(np.median([each.worst for each in found[0]]))
+            if self.over == "mean" and not self.observables[0].particles:
+                run.parts["chance"] = _chance(found[0])
             if len(found) > 1:
                 run.parts["velocity"] = float(np.median([each.rms for each in found[1]]))
         self.bound = 10.0 * max(self._size(reference), self.scale) or math.inf
@@ -227,6 +230,11 @@ class Converged(Judge):
             words = ", ".join(f"{name}={each[-1]:.4g}" for name, each in self.space.items())
             text += f" in time and space, to {words}" if words else ""
         return text
+
+
+def _chance(found: Sequence[Apart]) -> float:
+    """How large the median error of worlds might be by chance alone."""
+    return float(np.median([each.chance for each in found]))
 
 
 def times_of(

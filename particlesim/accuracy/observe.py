@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import validate
 from .one_world import worlds_of
+from .statistics import mean
 
 OVER = ("final", "max", "rms", "mean")
 WORDS = {
@@ -116,10 +117,15 @@ class World:
 
 @dataclass(frozen=True)
 class Apart:
-    """How far two series are apart: rms over what is counted, and of the worst of it."""
+    """How far two series are apart: rms over what is counted, and of the worst of it.
+
+    ``chance``: how large it might be by chance alone, of averages over time (95 %); 0 of others,
+    and where the series is too short to tell.
+    """
 
     rms: float
     worst: float
+    chance: float = 0.0
 
 
 @np.errstate(all="ignore")
@@ -141,9 +147,11 @@ def apart(
     Of vectors of particles it is their lengths, of those ``counted`` (n,); of other values their
     magnitudes.
     """
+    chance = 0.0
     if over == "final":
         d = d[-1:]
     elif over == "mean":
+        chance = 0.0 if seen.particles else _chance(d.reshape(len(d), -1))
         d = d.mean(axis=0, keepdims=True)
     size = np.linalg.norm(d, axis=-1) if seen.particles else np.abs(d)
     size = size.reshape(len(d), -1)
@@ -154,7 +162,17 @@ def apart(
     rms, worst = np.sqrt((size**2).mean(axis=1)), size.max(axis=1)
     if over == "rms":
         return Apart(float(np.sqrt((rms**2).mean())), float(np.sqrt((worst**2).mean())))
-    return Apart(float(rms.max()), float(worst.max()))
+    return Apart(float(rms.max()), float(worst.max()), chance)
+
+
+def _chance(d: np.ndarray) -> float:
+    """What the averages of series (times, m) may be by chance, root mean square.
+
+    Of differences of two runs: while these stay together there is none, however much they vary.
+    """
+    reaches = [mean(column).reach() for column in d.T]
+    finite = [each for each in reaches if math.isfinite(each)]
+    return float(np.sqrt(np.mean(np.square(finite)))) if finite else 0.0
 
 
 def moving(seen: Observable, world: World, values: np.ndarray) -> np.ndarray | None:

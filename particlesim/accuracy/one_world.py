@@ -13,10 +13,13 @@ from ..simulation.simulation import Simulation
 
 
 class OneWorld(Access):
-    """A world of a simulation of several, for functions that are written for one."""
+    """A world of a simulation of several, for functions that are written for one.
 
-    def __init__(self, sim: Simulation, index: int):
-        self.sim, self.index = sim, index
+    ``whole`` is shared by the worlds of one look, and holds the diagnostics of all of them.
+    """
+
+    def __init__(self, sim: Simulation, index: int, whole: list[Diagnostics]):
+        self.sim, self.index, self.whole = sim, index, whole
         self.scenes, self.world_count = [sim.scenes[index]], 1
         self.settings, self.device = sim.settings, sim.device
         self.particle_count = self.scenes[0].particle_count
@@ -41,7 +44,9 @@ class OneWorld(Access):
 
     def diagnostics(self) -> Diagnostics:
         """Those of this world."""
-        whole, here = self.sim.diagnostics(), slice(self.index, self.index + 1)
+        if not self.whole:
+            self.whole.append(self.sim.diagnostics())
+        (whole,), here = self.whole, slice(self.index, self.index + 1)
         return Diagnostics(*(getattr(whole, f.name)[here] for f in dataclasses.fields(whole)))
 
     def interpolate(self, fluid: Any, points: Any, field: Any, **options: Any) -> np.ndarray:
@@ -55,7 +60,8 @@ class OneWorld(Access):
 
 
 def worlds_of(sim: Simulation) -> list[Any]:
-    """The simulation itself if it has one world, else its worlds, each like a simulation."""
+    """The simulation itself if it has one world, else its worlds as they are now."""
     if sim.world_count == 1:
         return [sim]
-    return [OneWorld(sim, index) for index in range(sim.world_count)]
+    whole: list[Diagnostics] = []
+    return [OneWorld(sim, index, whole) for index in range(sim.world_count)]

@@ -57,6 +57,6 @@ class Reference:
             )
         )
 
-    def farthest(self, values: Seen) -> float:
+    def farthest(self, values: Seen) -> Apart:
         """The largest distance of all worlds."""
-        return max(each.rms for each in self.apart(values))
+        return max(self.apart(values), key=lambda each: each.rms)

@@ -64,7 +64,11 @@ class Refining:
         self.limit: Reference | None = None
         self.changes: list[float] = []
         self.limit_change = math.inf
+        self.chance = 0.0  # how large the last change might be by chance
         self.timed = False
+        self.remedy = (
+            "use fewer frames, if the scene is chaotic, averages over time, or another error"
+        )
         self.ratio = 1.0  # of the substeps of the last run to those before
 
     @property
@@ -102,13 +106,15 @@ class Refining:
         before, self.last = self.last, Reference(self.observables, self.over, worlds, values)
         if before is not None and self.ratio > 1.0:
             self._compare(before, self.last, float(sim.integrator.order))
-        self.last.own_error = self.change if before is not None else 0.0
+        self.last.own_error = max(self.change, self.chance) if before is not None else 0.0
         return self.last
 
     @np.errstate(all="ignore")
     def _compare(self, before: Reference, now: Reference, order: float) -> None:
         """Note the change, and the values without any step."""
-        self.changes.append(now.farthest(before.values))
+        change = now.farthest(before.values)
+        self.changes.append(change.rms)
+        self.chance = change.chance
         power = self.ratio**order
         limit = [
             [
@@ -125,7 +131,7 @@ class Refining:
             abs(self.changes[-2] - power * self.change) < ORDERLY * power * self.change
         )
         if orderly and last is not None:
-            self.limit_change = self.limit.farthest(last.values)
+            self.limit_change = self.limit.farthest(last.values).rms
         self.limit.own_error = self.limit_change
 
     def confirm(self, found: Reference) -> Reference:
@@ -142,10 +148,11 @@ class Refining:
         off, finer = found.own_error, self._run()
         if finer is None:
             return found
-        apart_by = finer.farthest(found.values)
+        apart_by = finer.farthest(found.values).rms
         if apart_by <= 2.0 * off or apart_by <= self.enough(0.0):
             return found
         finer.own_error = apart_by
+        self.remedy = "a law of time acts between their substeps; have it act for longer, or weaker"
         return finer
 
     def coarser(self, space: Mapping[str, Sequence[Any]]) -> Reference:
@@ -159,14 +166,14 @@ class Refining:
         self.ratio = 1.0
         if self._run() is not None:
             assert self.last is not None
-            held.own_error = max(held.own_error, self.last.farthest(held.values))
+            held.own_error = max(held.own_error, self.last.farthest(held.values).rms)
         return held
 
     def enough(self, allowed: float) -> float:
-        """The change that counts as none: the allowed one, or that of rounding."""
+        """The change that counts as none: the allowed one, or that of rounding or of chance."""
         assert self.last is not None
         sizes = [float(np.abs(x).max(initial=0.0)) for x in self.last.values[0]]
-        return max(allowed, ROUND_OFF * max(sizes))
+        return max(allowed, ROUND_OFF * max(sizes), self.chance)
 
     def diverged(self) -> SimulationError:
         """The error for the caller to raise where no run came to its end."""
@@ -186,8 +193,8 @@ class Refining:
             raise self.diverged()
         warnings.warn(
             f"{self.study.owner}: the reference must stop changing, got {self.change:.3g} from "
-            f"refining to {self.plan.settings.substeps} substeps; smaller errors mean nothing: use "
-            "fewer frames, if the scene is chaotic, averages over time, or another error.",
+            f"refining to {self.plan.settings.substeps} substeps; smaller errors mean nothing: "
+            f"{self.remedy}.",
             stacklevel=6,
         )
         return self.last
@@ -231,8 +238,9 @@ def settled(
         raise refining.diverged()
     raise validate.fail(
         study.owner, "reference", f"be known to {SHARE * tolerance:.3g}, a tenth of the tolerance",
-        refining.change, f"{refining.plan.settings.substeps} substeps changed it by that: use "
-        "fewer frames if the scene is chaotic, averages over time, or another error",
+        refining.change,
+        f"refining to {refining.plan.settings.substeps} substeps changed it by that: "
+        f"{refining.remedy}",
     )  # fmt: skip
 
 

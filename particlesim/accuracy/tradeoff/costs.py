@@ -12,6 +12,8 @@ import numpy as np
 from ..table import assignments, duration
 from .row import Row
 
+FURTHER = 0.01  # of its smallest error, to which a series is extrapolated
+LEAST = 0.1  # by which the logarithms of two errors differ, to draw a line through them
 STEPS = ("substeps", "dt")  # what the model has terms for, with the number of particles
 
 
@@ -65,7 +67,7 @@ def _decides(name: str, rows: Sequence[Row]) -> bool:
     counts: dict[str, set[int]] = {}
     for row in rows:
         counts.setdefault(repr(row.values[name]), set()).add(row.particles)
-    return len(counts) > 1 and all(len(each) == 1 for each in counts.values())
+    return len(set().union(*counts.values())) > 1 and all(len(n) == 1 for n in counts.values())
 
 
 def _fitted(rows: list[Row], left_out: set[str]) -> CostModel | None:
@@ -121,21 +123,33 @@ def along_of(vary: Mapping[str, Sequence[Any]]) -> str:
     return max(vary, key=lambda name: len(vary[name]))
 
 
-def cost_at(rows: Sequence[Row], error: float) -> float:
-    """What a series costs at an error, by interpolation of logarithms; nan if it has no such."""
+def cost_at(rows: Sequence[Row], error: float) -> tuple[float, bool]:
+    """What a series costs at an error, and whether it was followed beyond what was run.
+
+    By interpolation of logarithms; beyond its smallest error by the line through the last two, as
+    far as a hundredth of it. nan where it is further away, or too inaccurate to compare.
+    """
     best: list[Row] = []
     for row in sorted(rows, key=lambda row: (row.cost, row.error)):
         if not row.diverged and row.error > 0 and (not best or row.error < best[-1].error):
             best.append(row)
-    if not best or not best[-1].error <= error <= best[0].error * (1 + 1e-9):
-        return math.nan
+    if not best or error > best[0].error * (1 + 1e-9):
+        return math.nan, False
     x = np.log([row.error for row in reversed(best)])
     y = np.log([row.cost for row in reversed(best)])
-    return float(np.exp(np.interp(np.log(error), x, y)))
+    if error >= best[-1].error:
+        return float(np.exp(np.interp(np.log(error), x, y))), False
+    if len(best) < 2 or error < FURTHER * best[-1].error or x[1] - x[0] < LEAST:
+        return math.nan, True
+    slope = (y[0] - y[1]) / (x[0] - x[1])
+    return float(np.exp(y[0] + slope * (np.log(error) - x[0]))), True
 
 
 def common_error(series: Mapping[str, Sequence[Row]]) -> float:
-    """The smallest power of ten that two series reach, or what lies nearest to one; else nan."""
+    """A power of ten at which to compare: the smallest that two series reach.
+
+    Where they have none in common it is the largest of the more accurate one; nan of one series.
+    """
     reached = []
     for rows in series.values():
         errors = [row.error for row in rows if not row.diverged and row.error > 0]
@@ -144,11 +158,12 @@ def common_error(series: Mapping[str, Sequence[Row]]) -> float:
     if len(reached) < 2:
         return math.nan
     low = sorted(each[0] for each in reached)[1]
-    high = sorted((each[1] for each in reached), reverse=True)[1]
-    if low > high:
-        return math.nan
+    high = min(each[1] for each in reached)
     power = 10.0 ** math.ceil(math.log10(low) - 1e-9)
-    return power if power <= high else float(f"{math.sqrt(low * high):.1g}")
+    if power <= high:
+        return power
+    below = 10.0 ** math.floor(math.log10(high) + 1e-9)
+    return below if low > high or below >= low else float(f"{math.sqrt(low * high):.1g}")
 
 
 def speedups(rows: Sequence[Row], along: str, error: float | None) -> list[str]:
@@ -156,18 +171,21 @@ def speedups(rows: Sequence[Row], along: str, error: float | None) -> list[str]:
     series = series_of(rows, along)
     error = common_error(series) if error is None else error
     costs = {name: cost_at(members, error) for name, members in series.items()}
-    reached = sorted((n for n in costs if math.isfinite(costs[n])), key=lambda name: costs[name])
+    reached = sorted((n for n in costs if costs[n][0] > 0), key=lambda name: costs[name][0])
     if len(reached) < 2:
         return []
     slowest, at = reached[-1], _short(error)
     words = []
     for name in reached[:-1]:
-        ratio = costs[slowest] / costs[name]
+        ratio = costs[slowest][0] / costs[name][0]
         doubt = max(row.spread for key in (name, slowest) for row in series[key] if row.costs)
+        beyond = ", by extrapolation" if costs[slowest][1] or costs[name][1] else ""
         if ratio < 1.05 + 2.0 * doubt:
-            words.append(f"at an error of {at} {name} costs as much as {slowest}, as far as told")
+            words.append(f"{name} costs as much as {slowest} at an error of {at}, as far as told")
         else:
-            words.append(f"{name} is {ratio:.2g} times as fast as {slowest} at an error of {at}")
+            words.append(
+                f"{name} is {ratio:.2g} times as fast as {slowest} at an error of {at}{beyond}"
+            )
     return words
 
 

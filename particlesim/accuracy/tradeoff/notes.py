@@ -28,22 +28,19 @@ def notes(table: Any) -> list[str]:
     """The lines of a table's text."""
     runs = "1 run" if table.repeats == 1 else f"median of {table.repeats} runs"
     seeds = f", {table.seeds} seeds" if table.seeds > 1 else ""
-    flat = _not_conserved(table)
-    front = [] if flat else table.pareto()
-    near = [] if flat else table.contenders()
-    legend = "no front: the error is not one of the settings" if flat else (
-        "*: nothing is both cheaper and more accurate" + (", ~: as far as told" if near else "")
-    )  # fmt: skip
-    head = [
+    chains = _chains(table)
+    none = _not_conserved(table) or (len(chains) == 1 and len(table.stable) > 1)
+    front, near = ([], []) if none else (table.pareto(), table.contenders())
+    told = ", ~: as far as told" if near else ""
+    legend = "no front" if none else f"*: nothing is both cheaper and more accurate{told}"
+    return [
         f"{table.scene}: {table.duration:g} s on {table.device}, {runs}{seeds}",
         f"error: {table.error}",
         *_scale(table),
         f"s per s: wall seconds per simulated second; {legend}",
         "", *output.lines(table.vary, table.rows, front, near, table.seeds), "",
-    ]  # fmt: skip
-    return [
-        *head, *_orders(table), *_alike(table), *table.speedups(), *_costs(table), *_memory(table),
-        *(f"diverged, {row.label()}: {row.cause}" for row in table.diverged),
+        *_orders(table), *_alike(chains), *([] if none else table.speedups()), *_costs(table),
+        *_memory(table), *(f"diverged, {row.label()}: {row.cause}" for row in table.diverged),
     ]  # fmt: skip
 
 
@@ -83,23 +80,30 @@ def _orders(table: Any) -> list[str]:
     return lines
 
 
-def _alike(table: Any) -> list[str]:
-    """Rows whose errors differ no more than seeds do."""
-    if table.seeds < 2:
-        return []
+def _chains(table: Any) -> list[list[Row]]:
+    """Rows by their errors; together where these differ no more than seeds or chance explain."""
     chains: list[list[Row]] = []
+    chance = max((row.parts.get("chance", 0.0) for row in table.stable), default=0.0)
+    if table.seeds < 2 and chance == 0.0:
+        return chains
     for row in sorted(table.stable, key=lambda row: row.error):
-        if chains and not chains[-1][0].surely_better(row):
+        first = chains[-1][0] if chains else row
+        if chains and (row.error <= chance or not first.surely_better(row)):
             chains[-1].append(row)
         else:
             chains.append([row])
+    return chains
+
+
+def _alike(chains: list[list[Row]]) -> list[str]:
+    """Rows that cannot be told apart, in words."""
     lines = [
         "errors cannot be told apart (95 %): " + "; ".join(row.label() for row in chain)
         for chain in chains
         if len(chain) > 1
     ]
-    if len(chains) == 1 and len(table.stable) > 1:
-        lines.append("no front and no order: all errors differ by chance only; take more seeds")
+    if len(lines) == len(chains) == 1:
+        lines.append("no front and no order: all errors differ by chance only; run longer, or more")
     return lines
 
 
