@@ -139,7 +139,9 @@ def cost_at(rows: Sequence[Row], error: float) -> tuple[float, bool]:
     y = np.log([row.cost for row in reversed(best)])
     if error >= best[-1].error:
         return float(np.exp(np.interp(np.log(error), x, y))), False
-    if len(best) < 2 or error < FURTHER * best[-1].error or x[1] - x[0] < LEAST:
+    # What no longer falls has a floor.
+    floored = max(row.cost for row in rows if not row.diverged) > best[-1].cost
+    if floored or len(best) < 2 or error < FURTHER * best[-1].error or x[1] - x[0] < LEAST:
         return math.nan, True
     slope = (y[0] - y[1]) / (x[0] - x[1])
     return float(np.exp(y[0] + slope * (np.log(error) - x[0]))), True

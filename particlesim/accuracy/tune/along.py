@@ -66,8 +66,8 @@ class Along(Judge):
     def bounded(self, trial: Trial, margin: float) -> Trial:
         """A trial with the error that counts at all times at which the answer is known.
 
-        Within the margin at the end, and within the tolerance before; of what is longer without
-        anything on top for other seeds.
+        It is the largest of all of them. Of several seeds the margin is for the end: before it is
+        enough to be within the tolerance, and after it with nothing on top for yet another seed.
         """
         series = trial.series
         if trial.cause or series is None or len(series) < len(self.at):
@@ -76,8 +76,9 @@ class Along(Judge):
         before, after = series[self.valid & self.inside], series[self.valid & ~self.inside]
         if not np.isfinite(np.concatenate([before, after])).all():
             return dataclasses.replace(trial, limit=math.inf, along=math.inf)
-        widest = float((before.max(axis=1) - before.min(axis=1) + before.max(axis=1)).max())
-        parts = [2 * end.max() - end.min(), margin * widest, margin * after.max(initial=0.0)]
+        spare = margin if series.shape[1] > 1 else 1.0
+        widest = float((2 * before.max(axis=1) - before.min(axis=1)).max())
+        parts = [2 * end.max() - end.min(), spare * widest, spare * after.max(initial=0.0)]
         return dataclasses.replace(trial, limit=float(max(parts)), along=float(before.max()))
 
     def learn(self, coarse: Trial, fine: Trial, tolerance: float) -> bool:

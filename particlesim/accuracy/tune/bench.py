@@ -12,10 +12,12 @@ import numpy as np
 from ..judges import Judge
 from ..judging import choose_judge, measure
 from ..reference import Reference
-from ..run import LEAST, Run
+from ..run import Run
 from ..study import SEED, Study
 from .along import Along
 from .report import Trial
+
+ENOUGH = 0.02  # seconds of each setting that is weighed, of which the least repeat counts
 
 
 class Bench:
@@ -91,14 +93,12 @@ class Bench:
         for key, trial in self._known.items():
             self._known[key] = self.by.bounded(trial, self.margin)
 
-    def costs(
-        self, chosen: Sequence[Mapping[str, Any]], repeats: int, least: float = LEAST
-    ) -> list[float]:
+    def costs(self, chosen: Sequence[Mapping[str, Any]], repeats: int) -> list[float]:
         """Wall seconds per simulated second, measured in turn; the least, as disturbance adds.
 
         Infinite where it fails.
         """
         alone = self.study.alone()
         runs = [Run(alone, alone.plan(values)) for values in chosen]
-        measure(runs, Judge(), repeats, least=least)
+        measure(runs, Judge(), repeats, least=ENOUGH)
         return [min(run.costs) if run.costs and not run.cause else math.inf for run in runs]

@@ -33,6 +33,7 @@ class Search:
         target: The error to stay under.
         ladders: Values of each knob but the substeps; the first are tried first.
         levels: Substeps to choose from, rising.
+        weights: What a substep costs by (knob, value), where that has been measured before.
     """
 
     def __init__(
@@ -41,16 +42,18 @@ class Search:
         target: float,
         ladders: Mapping[str, Sequence[Any]],
         levels: Sequence[int],
+        weights: dict[tuple[str, str], float] | None = None,
     ):
         self.bench, self.target, self.ladders, self.levels = bench, target, ladders, levels
         self.best: Trial | None = None
         self.mode = {name: values[0] for name, values in ladders.items()}
-        self.weights: dict[tuple[str, str], float] = {}
+        self.weights = {} if weights is None else weights
 
     def run(self, start: int) -> Trial | None:
         """Search from about ``start`` substeps; None if nothing suffices."""
         level = self._level(start)
-        self._weigh(level)
+        if not self.weights:
+            self._weigh(level)
         self.mode = self._promising(level)
         self._least(self.mode, level, len(self.levels) - 1)
         changed = True

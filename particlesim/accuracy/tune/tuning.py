@@ -200,8 +200,9 @@ class _Tuning:
 
     def _learnt(self, bench: Bench, tolerance: float) -> Trial | None:
         """Search; of a known answer, again where it turns out to hold at more times."""
+        weights: dict[tuple[str, str], float] = {}
         for _ in range(ROUNDS):
-            search = Search(bench, self.margin * tolerance, self.ladders, self.substeps)
+            search = Search(bench, self.margin * tolerance, self.ladders, self.substeps, weights)
             best = search.run(self.study.settings.substeps)
             if best is None or self.along is None:
                 return best
