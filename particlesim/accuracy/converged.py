@@ -15,7 +15,7 @@ from .observe import WORDS, Apart, Observable, Series, World, observable
 from .reference import Reference
 from .refining import SHARE, Refining
 from .run import Run
-from .study import KNOBS, Plan, Study
+from .study import KNOBS, Plan, Study, options_of
 
 RUNS = 7  # of the reference, at most: to about 2^7 of the finest substeps that are judged
 MEMORY = 2**24  # bytes of what is seen of a run
@@ -37,8 +37,9 @@ class Converged(Judge):
         reference: Positions (n, 3) at the end; or a dict of knobs and options, or a Settings, that
             the reference takes. Without ``substeps`` and ``dt`` among them, substeps are refined
             from more than twice the finest until the values change by less than a tenth of the
-            smallest error. None: refine in float64, everything else as the finest of ``vary``. Or
-            a :class:`Reference` that has settled before.
+            smallest error. None: refine in float64, by velocity Verlet unless there are
+            constraints, everything else as the finest of ``vary``. Or a :class:`Reference` that
+            has settled before.
         observe: What is compared, a name or a function; None: positions.
         over: How differences over time become one number.
     """
@@ -55,6 +56,10 @@ class Converged(Judge):
         over: str = "max",
     ):
         self.study, self.over = study, over
+        self.varied: dict[str, set[str]] = {}
+        for plan in plans:
+            for name, value in plan.values.items():
+                self.varied.setdefault(name, set()).add(repr(value))
         first = observable(study.owner, "position" if observe is None else observe)
         self.observables = [first]
         if observe is None:
@@ -87,6 +92,7 @@ class Converged(Judge):
     def _refining(self, plans: Sequence[Plan], given: dict[str, Any]) -> Refining:
         settings = [plan.settings for plan in plans]
         base, values = self.study.settings, dict(given)
+        constrained = any(scene.constraints for scene in self.study.scenes(plans[0].options))
         finest = min(each.substep for each in settings)
         for name in sorted({*self.study.split(plans[0].values, "vary")[0]} - set(given)):
             different = {repr(plan.values[name]): plan.values[name] for plan in plans}
@@ -95,11 +101,11 @@ class Converged(Judge):
                 self.space[name] = self._resolutions(name, list(different.values()), given)
                 values[name] = self.space[name][-1]
                 finest /= FINER[-1]
-        verlet = any(each.integrator == "velocity_verlet" for each in settings)
         values.setdefault("precision", "float64")
         values.setdefault("compensated", True)
         values.setdefault("iterations", max(each.iterations for each in settings))
-        values.setdefault("integrator", "velocity_verlet" if verlet else base.integrator)
+        # Not by what is judged, where there is another: what that gets wrong, it would too.
+        values.setdefault("integrator", "symplectic_euler" if constrained else "velocity_verlet")
         refined = "substeps" not in given and "dt" not in given
         if refined:
             values["substeps"] = 2 * math.ceil(base.dt / finest * (1 - 1e-9)) + 1
@@ -229,7 +235,11 @@ class Converged(Judge):
             text += f"; the reference changed by {self.floor:.2g} when last refined"
             words = ", ".join(f"{name}={each[-1]:.4g}" for name, each in self.space.items())
             text += f" in time and space, to {words}" if words else ""
-        return text
+        varied = {name for name, values in self.varied.items() if len(values) > 1}
+        left = [
+            name for name in options_of(self.study.build) if name in SPACE and name not in varied
+        ]
+        return text + (f"; of time only, {', '.join(left)} stays as it is" if left else "")
 
 
 def _chance(found: Sequence[Apart]) -> float:

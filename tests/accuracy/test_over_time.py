@@ -215,3 +215,23 @@ def test_a_reference_is_finer_in_space_where_space_varies():
 def test_the_oscillator_that_is_compared_with():
     found = along(harmonic, two_turns(substeps=4), FRAMES, off_harmonic)
     np.testing.assert_allclose(found, np.abs(misses(4)), atol=1e-13)
+
+
+def test_of_what_stays_coarse_the_table_says_so():
+    table = sweep(waves, {"substeps": [1, 2]}, frames=2, settings=ps.Settings(dt=0.1))
+    assert "of time only, spacing stays as it is" in table.error
+
+
+def test_a_reference_does_not_share_the_integrator_of_what_is_judged():
+    class Slow(ps.Integrator):
+        """Drifts a hundredth too little, at any step."""
+
+        def advance(self, dt):
+            self.move(dt, 0.99 * dt)
+
+    table = sweep(settings=two_turns(integrator=Slow), vary={"substeps": [50, 100, 200]})
+    # omega^2 is 0.99, however fine; the rest is of first order, a phase of h / 2.
+    t = two_turns().dt * np.arange(1, FRAMES + 1)
+    wanted = np.abs(np.cos(math.sqrt(0.99) * t) - np.cos(t)).max()
+    for row in table.rows:
+        assert row.error == pytest.approx(wanted, abs=0.6 * row.settings.substep)
