@@ -21,7 +21,8 @@ from .observe import Observable, Series, World
 from .reference import Reference
 from .study import Plan, Study
 
-SETTLING = 0.7  # of the change two refinements ago; more is no convergence, of any order
+PATIENCE = 3  # changes before it counts that they do not fall, as those of impacts at first
+SETTLING = 0.7  # of the largest change so far; more is no convergence, of any order
 ORDERLY = 0.2  # by which changes may miss the ratio that extrapolation rests on
 SHARE = 0.1  # of the smallest error to be seen that the reference may still change by
 REFINEMENTS = 12  # at most, where the tolerance is known
@@ -82,7 +83,7 @@ class Refining:
             reference = self._run()
             if reference is not None:
                 yield reference
-                if len(self.changes) > 2 and self.change > SETTLING * self.changes[-3]:
+                if len(self.changes) > PATIENCE and self.change > SETTLING * max(self.changes[:-1]):
                     return  # chaos: further refinement would only cost
 
     def _refine(self, substeps: int) -> None:
