@@ -45,51 +45,63 @@ def grid_of(found, module, apart):
     return {**grid, "integrator": ["symplectic_euler", "velocity_verlet"]}
 
 
-def judged_by(name, module, frames, options, tolerance):
+def judged_by(name, module, frames, options, seeds, tolerance):
     """The largest error over time: against a reference, or of the pendulum's known answer."""
     if name == "pendulum":
         return {"error": "known", "over": "max"}
-    study = Study("test", module.build, module.settings, options, frames, "cpu")
-    forces = not module.build(**options).constraints
+    study = Study("test", module.build, module.settings, options, frames, "cpu", seeds=seeds)
+    forces = not study.scenes(options)[0].constraints
     finest = {"integrator": "velocity_verlet"} if forces else {"iterations": 8}
     finest["substeps"] = 2 * module.settings.substeps
     seen = [observable("test", "position")]
     return {"reference": settled(study, finest, tolerance, seen, "max", frames)}
 
 
-def check(name, apart=1.5):
-    """Tune a scene; its error with another seed, and its cost over the best of a full grid's.
+def tables_of(name, module, found, apart):
+    """The full grid, over a run that is 13 % longer, of the own start and of others.
 
-    Errors are the largest of all frames of a run that is 13 % longer than what it was tuned for. Of
-    the grid too, what counts is what meets the tolerance with either seed.
+    The others are five seeds in one batch with the own, where there are seeds, else one start.
     """
     tolerance, frames, options, other = SCENES[name]
+    seeds = range(6) if "seed" in other else 1
+    starts = [options] if "seed" in other or not other else [options, {**options, **other}]
+    longer = math.ceil(1.13 * frames)
+    return [
+        ps.tradeoff(
+            module.build, grid_of(found, module, apart), options=start, frames=longer,
+            settings=found.settings, device="cpu", seeds=seeds,
+            repeats=3 if start is options else 1,
+            **judged_by(name, module, longer, start, seeds, tolerance),
+        )
+        for start in starts
+    ]  # fmt: skip
+
+
+def check(name, apart=1.5):
+    """Tune a scene; its largest error of all starts, and its cost over the best of a full grid's.
+
+    Errors are the largest of all frames. Of the grid too, what counts is what meets the tolerance
+    from all starts.
+    """
+    tolerance, frames, options, _ = SCENES[name]
     module = importlib.import_module(f"particlesim.scenes.{name}")
     found = ps.tune(module.build, tolerance, frames=frames, options=options, device="cpu")
-    grid, longer = grid_of(found, module, apart), math.ceil(1.13 * frames)
-    tables = [
-        ps.tradeoff(
-            module.build, grid, options=chosen, repeats=repeats, frames=longer,
-            settings=found.settings, device="cpu",
-            **judged_by(name, module, longer, chosen, tolerance),
-        )
-        for chosen, repeats in ((options, 3), ({**options, **other}, 1))
-    ]  # fmt: skip
-    pairs = list(zip(tables[0].rows, tables[1].rows, strict=True))
-    (mine,) = [pair for pair in pairs if pair[0].settings == found.settings]
+    rows = list(zip(*(table.rows for table in tables_of(name, module, found, apart)), strict=True))
+    largest = [max(max(row.errors, default=math.inf) for row in each) for each in rows]
+    (mine,) = [k for k, each in enumerate(rows) if each[0].settings == found.settings]
     meeting = [
-        first
-        for first, second in pairs
-        if not first.diverged and max(first.error, second.error) <= tolerance
+        each[0]
+        for each, error in zip(rows, largest, strict=True)
+        if error <= tolerance and not any(row.diverged for row in each)
     ]
-    error, cost = mine[1].error, min(mine[0].costs)
-    best = min(meeting, key=lambda row: min(row.costs))
+    best = min(meeting, key=lambda row: row.cost)
+    ratio = rows[mine][0].cost / best.cost
     print(
-        f"{name}: {found.line}, error {found.error:.3g} of {tolerance:g}, other {error:.3g}, "
-        f"cost {cost / min(best.costs):.2f} of the best of {len(tables[0].rows)} "
-        f"({best.label()}), {len(found.trials)} trials"
+        f"{name}: {found.line}, error {found.error:.3g} of {tolerance:g}, of all starts "
+        f"{largest[mine]:.3g}, cost {ratio:.2f} of the best of {len(rows)} ({best.label()}), "
+        f"{len(found.trials)} trials"
     )
-    return error / tolerance, cost / min(best.costs)
+    return largest[mine] / tolerance, ratio
 
 
 @pytest.mark.parametrize("name", ["triple_pendulum", "three_body"])
@@ -105,4 +117,6 @@ def test_tunes_a_ready_scene(name):
 def test_tunes_every_ready_scene(name):
     error, cost = check(name)
     assert error <= 1.0
-    assert cost <= 1.5
+    # A block's bounces fall by the order 0.4 only, so that its margin of 0.8 by itself costs
+    # 0.8^(-1/0.4) = 1.75 times the substeps.
+    assert cost <= (2.0 if name == "bouncing_block" else 1.5)
