@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ... import validate
-from ...scene.settings import INTEGRATORS, PRECISIONS, Settings
+from ...scene.settings import INTEGRATORS, PRECISIONS
 from ..study import KNOBS, Study
 from .search import levels
 
@@ -48,9 +48,9 @@ def first(value: Any, values: Iterable[Any]) -> list[Any]:
     return [value, *(each for each in values if each != value)]
 
 
-def finest(owner: str, ladder: Mapping[str, list[Any]], settings: Settings) -> dict[str, Any]:
-    """What a reference starts from."""
-    chosen: dict[str, Any] = {"substeps": 2 * settings.substeps}
+def finest(owner: str, ladder: Mapping[str, list[Any]], substeps: int) -> dict[str, Any]:
+    """What a reference starts from, with so many substeps, which it refines."""
+    chosen: dict[str, Any] = {"substeps": substeps}
     if "integrator" in ladder:
         chosen["integrator"] = "velocity_verlet"
     if "iterations" in ladder:

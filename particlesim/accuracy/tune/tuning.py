@@ -189,8 +189,10 @@ class _Tuning:
     def _reference(self, tolerance: float) -> Reference:
         over, names = self.over or "max", [self.observe or "position"]
         observables = [observable(OWNER, name) for name in names]
-        first = finest(OWNER, self.ladders, self.study.settings)
-        own = {name: first[name] for name in first if name not in ("substeps",)}
+        # Not finer than it must be, as it is refined until it settles.
+        substeps = max(2 * self.substeps[0], self.study.settings.substeps // 2)
+        first = finest(OWNER, self.ladders, substeps)
+        own = {name: value for name, value in first.items() if name != "substeps"}
         plans = [
             self.study.plan({**own, "dt": dt})
             for dt in self.ladders.get("dt", [self.study.settings.dt])
