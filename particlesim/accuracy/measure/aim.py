@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..reference import nearest, rms
 from ..study import Plan
 from .bench import Bench
 from .levels import Level, Series
@@ -65,8 +64,9 @@ class Aim:
             for _ in range(frames):
                 self.bench.step(sim, "time")
             sim.close()
-            ends.append(sim.position.astype(np.float64))
-        changes = np.array([rms(nearest(sim, b - a)) for a, b in itertools.pairwise(ends)])
+            ends.append(sim.state.unwrapped())
+        moved = [((b - a) ** 2).sum(axis=1) for a, b in itertools.pairwise(ends)]
+        changes = np.array([np.sqrt(each.mean()) for each in moved])
         if changes[1] <= ROUNDING * float(np.abs(ends[-1]).max(initial=0.0)):
             return self.nominal
         p = found_order(np.array([4.0, 2.0, 1.0]), changes) or 1.0
