@@ -56,6 +56,7 @@ KEPT = 0.08  # of an energy, by "auto": a tenth, less what higher orders add
 LEAST = 0.001  # of the largest kinetic energy: what an energy near zero counts as
 
 
+@np.errstate(all="ignore")
 def look_ahead(loop: Loop, limits: list[Limit]) -> Ahead:
     """The path ahead of the present state, at which ``limits`` hold."""
     work = loop.work

@@ -112,6 +112,7 @@ def _in_order(limits: list[Limit]) -> list[Limit]:
     return sorted(limits, key=lambda limit: limit.dt)
 
 
+@np.errstate(all="ignore")
 def _limits_now(loop: Loop, quick: bool = False) -> list[Limit]:
     """Those of the present; ``quick``: what the settings surely keep may be smaller than it is."""
     limits: list[Limit] = []
