@@ -99,7 +99,7 @@ def jet_gases(k):
     arguments = dict(over="mean", frames=60, settings=settings)
     if k % 2:  # one long run of one start
         arguments["options"] = {"seed": k}
-    return Case(make_seeded(jets, 1000 * k), along, 1 / 3, 0.006, arguments)
+    return Case(make_seeded(jets, 1000 * k), along, 1 / 3, 0.005, arguments)
 
 
 def liquid(cells=3, density=0.8, seed=0):

@@ -78,4 +78,6 @@ def test_true_value_is_within_as_often_as_is_said():
     chance = [name for name in RUNS if name not in CERTAIN]
     assert 0.90 <= sum(hits[n] for n in chance) / sum(RUNS[n] for n in chance) <= 0.99
     assert 0.90 <= sum(hits.values()) / sum(RUNS.values()) <= 0.99
+    # Over all runs of a scene: where a handful of seeds happens to do, three levels of five seeds,
+    # without which nobody knows that they do, are more than that by themselves.
     assert max(costs.values()) <= 3.0

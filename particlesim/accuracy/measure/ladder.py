@@ -17,8 +17,7 @@ from .richardson import ROUNDING, Limit, limit
 
 RUNGS = 12  # at most
 SETTLING = 0.7  # of the change two refinements ago; more is no convergence, of any order
-ALIKE = 0.1  # of the variance of the samples that their changes may have, if each seed converges
-FALLING = 0.5  # of the variance of the changes before, likewise: a quarter by the first order
+FALLING = 0.5  # of the variance of the changes before, if seeds converge: a quarter by first order
 REMEDY = {
     "time": "allow a larger error, or observe what converges: of a chaotic scene only averages, "
     "over time or seeds, do",
@@ -115,9 +114,8 @@ class Ladder:
             return False
         x = np.array([level.samples[: self.shared] for level in self.levels[-3:]])
         changes = np.diff(x, axis=0).var(axis=1)
-        scatter = x[-2:].var(axis=1).sum()
         nothing = (ROUNDING * np.abs(x).max()) ** 2
-        wild = changes[1] > max(ALIKE * scatter, FALLING * changes[0], nothing)
+        wild = changes[1] > max(FALLING * changes[0], nothing)
         return bool(wild) and agree(self.levels[-3:])
 
     def value(self, found: Limit) -> Mean:
