@@ -16,6 +16,8 @@ from ..engine.loop import Source
 from ..kernels.constraints.rigid_motion import pose_kernel
 from ..kernels.instruments import residual as kernels
 
+UNMET = 0.02  # of a tuple's extent: what it may be off by
+
 
 def residuals(constraint: Any, sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
     """By how much a constraint is missed at the present positions.

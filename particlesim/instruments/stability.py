@@ -22,6 +22,7 @@ from ..interactions.fusion import fuse
 from ..scene.scene import Scene
 from ..scene.settings import AUTO, Settings
 from .foresight import look_ahead
+from .residuals import UNMET, off
 
 
 @dataclass(frozen=True, repr=False)
@@ -234,4 +235,18 @@ def misfit(loop: Loop) -> str:
                     f"{moved[row]:.3g} in the first substep, which gives it {moved[row] / dt:.3g} "
                     "length/s; call sim.project(iterations) first, or place it better."
                 )
-    return ""
+    return next((said for part in parts if (said := _held_apart(loop, part))), "")
+
+
+def _held_apart(loop: Loop, part: Constraint) -> str:
+    """That a tuple of pinned particles is not met, and never will be; empty if none is."""
+    pinned = loop.model.column("pinned")[part.tuples.particles] > 0
+    found = off(part, loop) if pinned.all(axis=1).any() else None
+    if found is None or not (unmet := pinned.all(axis=1) & (found[0] > UNMET)).any():
+        return ""
+    k = int(np.argmax(unmet))
+    size, rows = f"{found[0][k]:.2g}", part.tuples.particles[k].tolist()
+    return (
+        f"Simulation: pins must fit {part.name} within {UNMET:.0%} of its particles' distance, got "
+        f"{size} of it for particles {rows}; place them so, or leave the constraint out."
+    )

@@ -29,13 +29,12 @@ from ...constraints.constraint import Constraint
 from ...constraints.contact import Contact
 from ...engine.loop import Loop
 from ..diagnostics import measure, undisturbed
-from ..residuals import off, residuals
+from ..residuals import UNMET, off, residuals
 from ..stability import warn_if_past
 from .incident import SimulationWarning
 from .limits import GROWN, Limits
 
 DRIFT = 0.1  # of the largest kinetic energy
-UNMET = 0.02  # of a tuple's extent
 DEEP = 0.2  # of a radius
 FIRST = 8  # frames: what is ahead of a start is looked at as a run begins
 SHARE = 50  # times its own cost, from one round to the next
