@@ -33,6 +33,7 @@ FEW = 12  # evaluations: with fewer there is no path
 PHASE = 0.5  # omega h of a step on the path
 TOO_FAR = 0.8  # of it: what is taken back, too
 TRIES = 12  # of a step that goes too far
+SINGULAR = 1e12  # times the median stiffness of the way
 GROWN = 1.2  # times what was met before: the limits are asked again
 ASKED = 40  # times, at most
 FAINT = 0.1  # of the rms displacement: what moves less says nothing about stiffness
@@ -46,10 +47,13 @@ class Ahead:
 
     ``energy_step``: the largest step by which the energy of every world stays within ``KEPT`` of
     its scale, as far as the path goes; infinite where constraints leave it no meaning.
+    ``singular``: the path runs into a point, as of two bodies that fall straight on each other,
+    where the force grows beyond all bounds: no step is small enough, and no limit is told.
     """
 
     limit: Limit | None
     energy_step: float
+    singular: bool = False
 
 
 KEPT = 0.08  # of an energy, by "auto": a tenth, less what higher orders add
@@ -90,6 +94,7 @@ class _Path:
         self.crossing = _tightest([each for each in limits if each.part in names])
         self.found: Limit | None = None  # the tightest on the way
         self.when = 0.0
+        self.trail: list[float] = []  # how stiff it was, step by step
         self.asked, self.met = 0, np.zeros(3)
         self.moves = loop.model.column("pinned") == 0
         self.mass = loop.model.column("mass")
@@ -109,6 +114,7 @@ class _Path:
             if not h > 0.0:
                 break
             t += h
+            self.trail.append(stiffness)
             self.energies.note(h, self.v, before[2], self.a)
             sizes = self._sizes(stiffness)
             if (sizes > GROWN * self.met).any() and self.asked < ASKED and self.budget > 2 * LOOK:
@@ -116,7 +122,14 @@ class _Path:
                 self._ask(t)
             pace = TOO_FAR * PHASE / math.sqrt(stiffness) if stiffness > 0 else math.inf
             h = min(2.0 * h, pace, PHASE * self.crossing)
+        if self._singular():
+            return Ahead(None, math.inf, singular=True)
         return Ahead(self._told(), self.energies.step(loop.integrator.order))
+
+    def _singular(self) -> bool:
+        """Whether it was stiffer than on most of the way by more than any orbit could be."""
+        trail = np.array(self.trail)
+        return len(trail) >= FEW and bool(trail.max() > SINGULAR * np.median(trail))
 
     def _told(self) -> Limit | None:
         found = self.found

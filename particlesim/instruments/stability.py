@@ -187,7 +187,9 @@ def automatic(scenes: Sequence[Scene], settings: Settings, device: Any) -> Setti
     trial = settings.replace(dt=PROVISIONAL) if of_frame else settings.replace(substeps=1)
     limit = _chosen(Loop(scenes, trial, device, fuse), settings.safety)
     if not 0.0 < limit < math.inf:
-        what = "no part limits it" if limit else "the forces are not finite at the start"
+        what = "no part limits it" if limit > 0.0 else "the forces are not finite at the start"
+        if math.isnan(limit):
+            what = "particles fall into a point, which no step is small enough for"
         raise validate.fail(
             "Settings", name, f"be a number in a scene where {what}", AUTO, "give one"
         )
@@ -197,9 +199,14 @@ def automatic(scenes: Sequence[Scene], settings: Settings, device: Any) -> Setti
 
 
 def _chosen(loop: Loop, safety: float | None) -> float:
-    """The substep that ``"auto"`` takes: a part of the limit, or what the energy asks for, too."""
+    """The substep that ``"auto"`` takes: a part of the limit, or what the energy asks for, too.
+
+    Not a number where the path ahead is singular.
+    """
     limits = _limits_now(loop)
     ahead = look_ahead(loop, limits)
+    if ahead.singular:
+        return math.nan
     limits += [] if ahead.limit is None else [ahead.limit]
     largest = min((each.dt for each in limits), default=math.inf)
     if safety is not None:

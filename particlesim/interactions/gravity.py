@@ -14,6 +14,7 @@ from ..scene.law import law
 from .pair import Pair
 
 MOST = 4096  # bodies of a world whose pairs are all looked at
+HEAD_ON = 1e-6  # of their distance: a pericentre that counts as none
 PHASE = 0.5  # omega dt at the pericentre; leapfrog's energy is off by about a third of its square
 
 
@@ -59,7 +60,9 @@ def _of_world(part: Any, peer: Any, probe: Probe, w: int, rows: np.ndarray) -> l
         omega = np.sqrt(mu) / (closest**2 + s**2) ** 0.75
         alone = np.linalg.norm(tide, axis=1) < np.linalg.norm(own, axis=1)
         coming = ((d * u).sum(axis=1) < 0) | (energy < 0)
-    ready = alone & coming & (mu > 0) & (omega > 0)
+    # Who falls straight on another meets what no step is small enough for.
+    passing = closest**2 + s**2 > (HEAD_ON * r) ** 2
+    ready = alone & coming & passing & (mu > 0) & (omega > 0)
     if not ready.any():
         return []
     k = int(np.argmax(np.where(ready, omega, 0.0)))
