@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from .. import validate
-from ..instruments.watchdog.incident import SimulationError
+from ..instruments.watchdog.incident import SimulationError, SimulationWarning
 from ..simulation.simulation import Simulation
 from .observe import Observable, Series, World
 from .reference import Reference
@@ -249,10 +249,12 @@ def ended(study: Study, plan: Plan, watch: Callable[[Simulation], None]) -> Simu
     """The simulation of a plan at its end, looked at on the way; None if it diverges."""
     sim = study.batch(plan)
     try:
-        watch(sim)
-        for _ in range(plan.frames):
-            sim.step()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SimulationWarning)  # how wrong it is will be seen
             watch(sim)
+            for _ in range(plan.frames):
+                sim.step()
+                watch(sim)
     except SimulationError:
         return None
     finally:
