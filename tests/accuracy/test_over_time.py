@@ -103,6 +103,17 @@ def test_worst_and_velocity():
     assert row.parts["velocity"] == pytest.approx(largest, rel=1e-4)
 
 
+def test_a_table_is_saved_with_what_each_row_has(tmp_path):
+    # The first diverges, and has no worst particle: omega h = 2.6.
+    table = sweep(vary={"substeps": [1, 8]}, settings=two_turns(frames=24, dt=2.6), frames=40)
+    assert table.rows[0].diverged and not table.rows[1].diverged
+    for name in ("a.csv", "a.json"):
+        table.save(tmp_path / name)
+    assert "worst_error" in (tmp_path / "a.csv").read_text()
+    assert '"errors": [' in (tmp_path / "a.json").read_text()
+    table.plot(tmp_path / "a.png")
+
+
 def test_values_of_any_shape():
     table = sweep(
         vary={"substeps": [4]}, observe=lambda sim: np.outer(sim.position[0], [1.0, 1.0]),
