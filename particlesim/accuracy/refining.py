@@ -21,7 +21,8 @@ from .observe import Observable, Series, World
 from .reference import Reference
 from .study import Plan, Study
 
-PATIENCE = 3  # changes before it counts that they do not fall, as those of impacts at first
+PATIENCE = 3  # changes before it counts that they do not fall; one less where they are large
+LARGE = 0.3  # of what there is to be seen
 SETTLING = 0.7  # of the largest change so far; more is no convergence, of any order
 ORDERLY = 0.2  # by which changes may miss the ratio that extrapolation rests on
 SHARE = 0.1  # of the smallest error to be seen that the reference may still change by
@@ -83,8 +84,14 @@ class Refining:
             reference = self._run()
             if reference is not None:
                 yield reference
-                if len(self.changes) > PATIENCE and self.change > SETTLING * max(self.changes[:-1]):
-                    return  # chaos: further refinement would only cost
+                if self._is_chaotic(reference):
+                    return  # further refinement would only cost
+
+    def _is_chaotic(self, reference: Reference) -> bool:
+        """Whether the changes do not fall, as those of impacts do not at first."""
+        large = self.change > LARGE * reference.scale
+        enough = len(self.changes) > (PATIENCE - 1 if large else PATIENCE)
+        return enough and self.change > SETTLING * max(self.changes[:-1])
 
     def _refine(self, substeps: int) -> None:
         self.ratio = substeps / self.plan.settings.substeps
