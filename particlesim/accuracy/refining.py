@@ -87,6 +87,15 @@ class Refining:
                 if self._is_chaotic(reference):
                     return  # further refinement would only cost
 
+    def _doubt(self, order: float) -> float:
+        """How far off the last run may be: its change, or that to be expected by the one before.
+
+        A single small change may be luck, as of impacts: of one there is nothing to be said yet.
+        """
+        if len(self.changes) < 2:
+            return self.change if self.most <= 2 and self.changes else math.inf
+        return max(self.change, self.changes[-2] / self.ratio**order)
+
     def _is_chaotic(self, reference: Reference) -> bool:
         """Whether the changes do not fall, as those of impacts do not at first."""
         large = self.change > LARGE * reference.scale
@@ -114,7 +123,7 @@ class Refining:
         before, self.last = self.last, Reference(self.observables, self.over, worlds, values)
         if before is not None and self.ratio > 1.0:
             self._compare(before, self.last, float(sim.integrator.order))
-        self.last.own_error = max(self.change, self.chance) if before is not None else 0.0
+        self.last.own_error = max(self._doubt(float(sim.integrator.order)), self.chance)
         return self.last
 
     @np.errstate(all="ignore")
