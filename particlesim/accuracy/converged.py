@@ -17,7 +17,7 @@ from .refining import SHARE, Refining
 from .run import Run
 from .study import KNOBS, Plan, Study, options_of
 
-RUNS = 7  # of the reference, at most: to about 2^7 of the finest substeps that are judged
+RUNS = 8  # of the reference, at most: to about 2^7 of the finest substeps that are judged
 MEMORY = 2**24  # bytes of what is seen of a run
 MOST = 1000  # times at which it is looked at, at most
 # Options that say how fine space is divided, and whether more of it is finer.
@@ -36,8 +36,8 @@ class Converged(Judge):
         plans: All settings that are to be judged.
         reference: Positions (n, 3) at the end; or a dict of knobs and options, or a Settings, that
             the reference takes. Without ``substeps`` and ``dt`` among them, substeps are refined
-            from more than twice the finest until the values change by less than a tenth of the
-            smallest error. None: refine in float64, by velocity Verlet unless there are
+            from more than the finest until the values change by less than a tenth of the smallest
+            error, twice. None: refine in float64, by velocity Verlet unless there are
             constraints, everything else as the finest of ``vary``. Or a :class:`Reference` that
             has settled before.
         observe: What is compared, a name or a function; None: positions.
@@ -108,7 +108,7 @@ class Converged(Judge):
         values.setdefault("integrator", "symplectic_euler" if constrained else "velocity_verlet")
         refined = "substeps" not in given and "dt" not in given
         if refined:
-            values["substeps"] = 2 * math.ceil(base.dt / finest * (1 - 1e-9)) + 1
+            values["substeps"] = math.ceil(base.dt / finest * (1 - 1e-9)) + 1 | 1
         plan = self.study.plan(values, "reference")
         # Of space it is what remains of space that decides.
         most = (2 if self.space else RUNS) if refined else 1
@@ -168,7 +168,7 @@ class Converged(Judge):
                 return
             if self.space:
                 continue
-            if self.given.change <= self.given.enough(SHARE * self._least(alive)):
+            if reference.own_error <= self.given.enough(SHARE * self._least(alive)):
                 self._compare(alive, self.given.confirm(reference))
                 if self.floor <= self.given.enough(SHARE * self._least(alive)):
                     return
@@ -190,7 +190,8 @@ class Converged(Judge):
 
     @np.errstate(all="ignore")
     def _compare(self, runs: Sequence[Run], reference: Reference) -> None:
-        self.found, self.floor = reference, reference.own_error
+        own = reference.own_error
+        self.floor = own if math.isfinite(own) else 0.0  # of a single run it is not known
         self.scale = reference.scale
         for run in runs:
             series = run.notes["series"]

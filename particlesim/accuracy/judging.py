@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from .. import validate
+from ..instruments.watchdog.incident import SimulationWarning
 from ..scene.settings import Settings
 from .converged import Converged
 from .judges import EnergyDrift, Judge, Known, MomentumDrift
@@ -82,6 +84,21 @@ def measure(
         least: Seconds of each to be measured, in all repeats together.
     """
     judge.check(runs)
+    with warnings.catch_warnings():
+        # That coarse settings are wrong is what is measured.
+        warnings.simplefilter("ignore", SimulationWarning)
+        _run_in_turn(runs, judge, repeats, progress, least)
+    judge.judge(runs)
+
+
+def _run_in_turn(
+    runs: Sequence[Run],
+    judge: Judge,
+    repeats: int,
+    progress: Callable[[int, int], None] | None,
+    least: float,
+) -> None:
+    """Every run once in each repeat; the first is looked at by the judge."""
     done, total = 0, repeats * sum(run.plan.frames for run in runs)
 
     def count(frames: int = 1) -> None:
@@ -111,7 +128,6 @@ def measure(
     for run in runs:
         run.sim.close()
         run.judged.close()
-    judge.judge(runs)
 
 
 def mark(runs: Sequence[Run], bound: float) -> None:

@@ -20,6 +20,27 @@ WORDS = {
     "rms": "root mean square over all frames",
     "mean": "of the average over all frames",
 }
+
+
+def _temperature(sim: Any) -> float:
+    """k T = 2 K / (3 n), n the particles that are not pinned [energy]."""
+    free = int(np.count_nonzero(~np.asarray(sim.scenes[0].pinned, dtype=bool)))
+    return 2.0 * float(sim.diagnostics().kinetic[0]) / (3.0 * max(free, 1))
+
+
+def _pressure(sim: Any) -> float:
+    """P = (2 K + sum r.F) / (3 V) in a periodic box (Clausius 1870)."""
+    box = sim.scenes[0].periodic
+    if box is None or not all(box[2]):
+        raise validate.fail(
+            "observe", "pressure", "be of a scene that is periodic on all axes", box,
+            "give a function of the simulation",
+        )  # fmt: skip
+    now = sim.diagnostics()
+    volume = float(np.prod(np.asarray(box[1]) - np.asarray(box[0])))
+    return (2.0 * float(now.kinetic[0]) + float(now.virial[0])) / (3.0 * volume)
+
+
 READY: dict[str, Callable[[Any], Any]] = {
     "position": lambda sim: sim.position,
     "velocity": lambda sim: sim.velocity,
@@ -29,6 +50,8 @@ READY: dict[str, Callable[[Any], Any]] = {
     "potential": lambda sim: sim.diagnostics().potential[0],
     "energy": lambda sim: sim.diagnostics().energy[0],
     "virial": lambda sim: sim.diagnostics().virial[0],
+    "temperature": _temperature,
+    "pressure": _pressure,
 }
 PARTICLES = ("position", "velocity")  # one vector for each
 
@@ -129,13 +152,17 @@ class Apart:
 
 
 @np.errstate(all="ignore")
+def shortest(d: np.ndarray, box: np.ndarray) -> np.ndarray:
+    """Displacements by the short way round a periodic box of lengths ``box``, 0 where open."""
+    turns = np.divide(d, box, out=np.zeros_like(d), where=box > 0)
+    return d - box * np.round(turns)
+
+
 def step_between(seen: Observable, world: World, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a - b, of positions by the short way round a periodic box."""
-    d = a - b
-    if not seen.wrapped:
-        return d
-    turns = np.divide(d, world.box, out=np.zeros_like(d), where=world.box > 0)
-    return d - world.box * np.round(turns)
+    """a - b, of positions by the short way round."""
+    with np.errstate(all="ignore"):
+        d = a - b
+    return shortest(d, world.box) if seen.wrapped else d
 
 
 @np.errstate(all="ignore")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from .observe import Apart, Observable, World, apart, moving, scale_of, step_between
+from .observe import Apart, Observable, World, apart, moving, scale_of, shortest, step_between
 
 Seen = list[list[np.ndarray]]  # values by observable and world, each (times + 1, ...)
 
@@ -60,3 +61,14 @@ class Reference:
     def farthest(self, values: Seen) -> Apart:
         """The largest distance of all worlds."""
         return max(self.apart(values), key=lambda each: each.rms)
+
+
+def nearest(sim: Any, d: np.ndarray) -> np.ndarray:
+    """Displacements of all particles (n, 3) by the short way round their boxes."""
+    return shortest(d, sim.model.box_length[sim.model.world_of])
+
+
+@np.errstate(all="ignore")
+def rms(d: np.ndarray) -> float:
+    """Root mean square length of vectors (n, 3)."""
+    return float(np.sqrt((d**2).sum(axis=1).mean())) if len(d) else 0.0

@@ -15,13 +15,14 @@ from typing import Any
 import numpy as np
 
 from .. import validate
-from ..instruments.watchdog.incident import SimulationError
+from ..instruments.watchdog.incident import SimulationError, SimulationWarning
 from ..simulation.simulation import Simulation
 from .observe import Observable, Series, World
 from .reference import Reference
 from .study import Plan, Study
 
-PATIENCE = 3  # changes before it counts that they do not fall, as those of impacts at first
+PATIENCE = 3  # changes before it counts that they do not fall; one less where they are large
+LARGE = 0.3  # of what there is to be seen
 SETTLING = 0.7  # of the largest change so far; more is no convergence, of any order
 ORDERLY = 0.2  # by which changes may miss the ratio that extrapolation rests on
 SHARE = 0.1  # of the smallest error to be seen that the reference may still change by
@@ -83,8 +84,23 @@ class Refining:
             reference = self._run()
             if reference is not None:
                 yield reference
-                if len(self.changes) > PATIENCE and self.change > SETTLING * max(self.changes[:-1]):
-                    return  # chaos: further refinement would only cost
+                if self._is_chaotic(reference):
+                    return  # further refinement would only cost
+
+    def _doubt(self, order: float) -> float:
+        """How far off the last run may be: its change, or that to be expected by the one before.
+
+        A single small change may be luck, as of impacts: of one there is nothing to be said yet.
+        """
+        if len(self.changes) < 2:
+            return self.change if self.most <= 2 and self.changes else math.inf
+        return max(self.change, self.changes[-2] / self.ratio**order)
+
+    def _is_chaotic(self, reference: Reference) -> bool:
+        """Whether the changes do not fall, as those of impacts do not at first."""
+        large = self.change > LARGE * reference.scale
+        enough = len(self.changes) > (PATIENCE - 1 if large else PATIENCE)
+        return enough and self.change > SETTLING * max(self.changes[:-1])
 
     def _refine(self, substeps: int) -> None:
         self.ratio = substeps / self.plan.settings.substeps
@@ -107,7 +123,7 @@ class Refining:
         before, self.last = self.last, Reference(self.observables, self.over, worlds, values)
         if before is not None and self.ratio > 1.0:
             self._compare(before, self.last, float(sim.integrator.order))
-        self.last.own_error = max(self.change, self.chance) if before is not None else 0.0
+        self.last.own_error = max(self._doubt(float(sim.integrator.order)), self.chance)
         return self.last
 
     @np.errstate(all="ignore")
@@ -249,10 +265,12 @@ def ended(study: Study, plan: Plan, watch: Callable[[Simulation], None]) -> Simu
     """The simulation of a plan at its end, looked at on the way; None if it diverges."""
     sim = study.batch(plan)
     try:
-        watch(sim)
-        for _ in range(plan.frames):
-            sim.step()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SimulationWarning)  # how wrong it is will be seen
             watch(sim)
+            for _ in range(plan.frames):
+                sim.step()
+                watch(sim)
     except SimulationError:
         return None
     finally:

@@ -30,7 +30,7 @@ Observe = Annotated[
     typer.Option(
         metavar="NAME",
         help="Compare this with a reference: position, velocity, energy, kinetic, potential, "
-        "momentum, angular_momentum, virial, or a function of the scene's module.",
+        "momentum, angular_momentum, virial, temperature, pressure, or a function of the scene.",
     ),
 ]
 Over = Annotated[

@@ -8,6 +8,7 @@ import warp as wp
 
 import particlesim as ps
 from cases.closed_forms import EXACT, along, harmonic, off_harmonic, two_turns
+from particlesim.accuracy.observe import READY
 
 FRAMES = 24
 STEPS = [2, 4, 8, 16]
@@ -102,6 +103,17 @@ def test_worst_and_velocity():
     assert row.parts["velocity"] == pytest.approx(largest, rel=1e-4)
 
 
+def test_a_table_is_saved_with_what_each_row_has(tmp_path):
+    # The first diverges, and has no worst particle: omega h = 2.6.
+    table = sweep(vary={"substeps": [1, 8]}, settings=two_turns(frames=24, dt=2.6), frames=40)
+    assert table.rows[0].diverged and not table.rows[1].diverged
+    for name in ("a.csv", "a.json"):
+        table.save(tmp_path / name)
+    assert "worst_error" in (tmp_path / "a.csv").read_text()
+    assert '"errors": [' in (tmp_path / "a.json").read_text()
+    table.plot(tmp_path / "a.png")
+
+
 def test_values_of_any_shape():
     table = sweep(
         vary={"substeps": [4]}, observe=lambda sim: np.outer(sim.position[0], [1.0, 1.0]),
@@ -112,7 +124,7 @@ def test_values_of_any_shape():
 
 
 def test_ready_observables():
-    for name in ("velocity", "energy", "kinetic", "potential", "momentum", "angular_momentum"):
+    for name in ("velocity", "energy", "temperature", "momentum", "angular_momentum"):
         table = sweep(vary={"substeps": [4, 8]}, observe=name, reference={"substeps": 200})
         assert f"difference of {name}" in table.error and table.rows[0].error < 0.1
 
@@ -235,3 +247,14 @@ def test_a_reference_does_not_share_the_integrator_of_what_is_judged():
     wanted = np.abs(np.cos(math.sqrt(0.99) * t) - np.cos(t)).max()
     for row in table.rows:
         assert row.error == pytest.approx(wanted, abs=0.6 * row.settings.substep)
+
+
+def test_temperature_and_pressure(refused):
+    scene = ps.Scene(periodic=((0, 0, 0), (2, 2, 2)))
+    scene.add_particles([(0, 0, 0), (1, 1, 1)], velocity=[(3, 0, 0), (0, 4, 0)])
+    sim = ps.Simulation(scene, device="cpu")
+    # 2 K = 25 of two particles in a volume of 8, which do not feel each other.
+    assert READY["temperature"](sim) == pytest.approx(25 / 6)
+    assert READY["pressure"](sim) == pytest.approx(25 / 24)
+    with refused("pressure must be of a scene that is periodic on all axes"):
+        READY["pressure"](ps.Simulation(harmonic(), device="cpu"))

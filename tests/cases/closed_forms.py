@@ -36,7 +36,7 @@ def off_harmonic(sim):
 
 def two_turns(frames=24, **knobs):
     """Settings of frames that make two whole periods."""
-    return ps.Settings(dt=2 * TURN / frames, **{**EXACT, **knobs})
+    return ps.Settings(**{"dt": 2 * TURN / frames, **EXACT, **knobs})
 
 
 def along(build, settings, frames, error, **options):

@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+from particlesim import cli
+
 
 def test_command(tmp_path):
     scene = tmp_path / "swing.py"
@@ -29,11 +31,22 @@ def test_command(tmp_path):
         [*command, "--by", "guess"], capture_output=True, text=True, timeout=120, check=False
     )
     assert done.returncode == 2 and done.stderr.count("\n") == 1
-    done = subprocess.run(
-        [*command, "--budget", "1 ms", "--observe", "velocity", "--over", "final"],
-        capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert (
-        "a run of" in done.stdout and "of velocity" in done.stdout and "at the end" in done.stdout
+
+
+def test_command_in_a_time(tmp_path, capsys):
+    scene = tmp_path / "swing.py"
+    scene.write_text(
+        "import particlesim as ps\n"
+        "settings, frames = ps.Settings(dt=0.1), 4\n"
+        "def build():\n"
+        "    scene = ps.Scene()\n"
+        "    scene.add_particles([(0, 0, 0)], velocity=(1, 0, 0))\n"
+        "    scene.add_interaction(ps.Drag(linear=1.0))\n"
+        "    return scene\n"
     )
+    words = ["tune", str(scene), "--device", "cpu", "--vary", "precision=float64"]
+    assert cli.main([*words, "--budget", "0.1 ms", "--observe", "velocity", "--over", "final"]) == 0
+    out = capsys.readouterr().out
+    assert "a run of" in out and "difference of velocity" in out and "at the end" in out
+    assert cli.main([*words, "--budget", "soon"]) == 2
+    assert "budget must be a number and a unit" in capsys.readouterr().err

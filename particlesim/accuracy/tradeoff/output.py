@@ -39,6 +39,8 @@ def as_json(about: dict[str, Any], rows: Sequence[Row], front: Sequence[Row]) ->
             {
                 **_figures(row, front),
                 "costs": row.costs,
+                "cpu_costs": row.cpu_costs,
+                "errors": row.errors,
                 "values": row.values,
                 "settings": dataclasses.asdict(row.settings),
                 "options": row.options,
@@ -53,7 +55,9 @@ def as_csv(rows: Sequence[Row], front: Sequence[Row]) -> str:
     """One line a row: what varied, then what was measured."""
     lines = [{**row.values, **_figures(row, front)} for row in rows]
     stream = io.StringIO()
-    writer = csv.DictWriter(stream, list(lines[0]) if lines else [], lineterminator="\n")
+    # What diverged has not all of what the others have.
+    names = {name: None for line in lines for name in line}
+    writer = csv.DictWriter(stream, list(names), lineterminator="\n")
     writer.writeheader()
     writer.writerows(lines)
     return stream.getvalue()

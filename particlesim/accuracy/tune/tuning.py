@@ -189,8 +189,7 @@ class _Tuning:
     def _reference(self, tolerance: float) -> Reference:
         over, names = self.over or "max", [self.observe or "position"]
         observables = [observable(OWNER, name) for name in names]
-        # Not finer than it must be, as it is refined until it settles.
-        substeps = max(2 * self.substeps[0], self.study.settings.substeps // 2)
+        substeps = 2 * self.study.settings.substeps  # past where impacts make it irregular
         first = finest(OWNER, self.ladders, substeps)
         own = {name: value for name, value in first.items() if name != "substeps"}
         plans = [
