@@ -1,5 +1,7 @@
 """The public names, by room: what ``import particlesim`` offers, and where it is."""
 
+from .accuracy.measure.measuring import measure
+from .accuracy.measure.report import Measured
 from .accuracy.stress.sweep import Stress, stress
 from .accuracy.tradeoff.sweep import tradeoff
 from .accuracy.tradeoff.table import Tradeoff
@@ -60,6 +62,7 @@ __all__ = [
     "Law",
     "Ledger",
     "LennardJones",
+    "Measured",
     "PairForce",
     "PairPotential",
     "PairSum",
@@ -86,6 +89,7 @@ __all__ = [
     "__version__",
     "launch",
     "law",
+    "measure",
     "read_history",
     "sample",
     "stress",

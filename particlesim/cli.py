@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 
 from .commands import measure, run
+from .commands.number import measure as measure_number
 from .commands.render import render
 from .commands.shell import complain
 from .commands.usd import usd
@@ -60,6 +61,7 @@ app.command()(run.explain)
 app.command()(measure.tradeoff)
 app.command()(measure.tune)
 app.command()(measure.stress)
+app.command("measure")(measure_number)
 app.command()(render)
 app.command()(view)
 app.command()(run.plot)

@@ -3,40 +3,66 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from .. import validate
+from ..scene.settings import Settings
 from .converged import Converged
 from .judges import EnergyDrift, Judge, Known, MomentumDrift
-from .run import Run
+from .observe import OVER
+from .reference import Reference
+from .run import LEAST, Run
 from .study import Plan, Study
 
 ERRORS = ("known", "converged", "energy", "momentum")
 
 
-def choose_judge(study: Study, plans: Sequence[Plan], error: Any, reference: Any) -> Judge:
+def choose_judge(
+    study: Study,
+    plans: Sequence[Plan],
+    error: Any,
+    reference: Any,
+    observe: Any = None,
+    over: str | None = None,
+) -> Judge:
     """What gives the runs their errors (see :func:`particlesim.tradeoff`)."""
-    if error is None:
-        known = study.known_here and reference is None
-        error = "known" if known else "converged"
+    owner = study.owner
+    if over is not None:
+        validate.choice(owner, "over", over, OVER)
+    error = which_error(study, error, reference, observe)
     if error != "converged" and reference is not None:
         raise validate.fail(
-            study.owner, "error", "be 'converged' with a reference", error, "leave one of them out"
+            owner, "error", "be 'converged' with a reference", error, "leave one of them out"
         )
     if callable(error):
-        return Known(error)
-    validate.choice(study.owner, "error", error, ERRORS)
+        return Known(error, over or "final")
+    validate.choice(owner, "error", error, ERRORS)
     if error == "converged":
-        return Converged(study, plans, reference)
+        along = isinstance(reference, Mapping | Settings | Reference | None)
+        return Converged(study, plans, reference, observe, over or ("max" if along else "final"))
     if error == "known":
         if study.known is None:
             raise validate.fail(
-                study.owner, "error", f"be another where {study.label} has no error(sim)", error,
+                owner, "error", f"be another where {study.label} has no error(sim)", error,
                 "pass a function, 'converged', 'energy' or 'momentum'",
             )  # fmt: skip
-        return Known(study.known)
-    return EnergyDrift() if error == "energy" else MomentumDrift()
+        return Known(study.known, over or "final")
+    return EnergyDrift(over or "max") if error == "energy" else MomentumDrift(over or "max")
+
+
+def which_error(study: Study, error: Any, reference: Any, observe: Any) -> Any:
+    """The error that is meant: what is observed is compared with a reference."""
+    if observe is not None:
+        if error not in (None, "converged"):
+            raise validate.fail(
+                study.owner, "error", "be left out, or 'converged', with observe", error,
+                "give one of the two",
+            )  # fmt: skip
+        return "converged"
+    if error is None:
+        return "known" if study.known_here and reference is None else "converged"
+    return error
 
 
 def measure(
@@ -44,8 +70,17 @@ def measure(
     judge: Judge,
     repeats: int,
     progress: Callable[[int, int], None] | None = None,
+    least: float = LEAST,
 ) -> None:
-    """Warm up, run in turn, and judge."""
+    """Warm up, run in turn, and judge.
+
+    Args:
+        runs: What is measured.
+        judge: Gives the errors.
+        repeats: Of each.
+        progress: Gets the frames done, and all there are.
+        least: Seconds of each to be measured, in all repeats together.
+    """
     judge.check(runs)
     done, total = 0, repeats * sum(run.plan.frames for run in runs)
 
@@ -57,18 +92,25 @@ def measure(
 
     for run in runs:
         run.warm_up()
+        run.least = least / repeats
     for repeat in range(repeats):
-        watch = judge.watch if judge.watches and repeat == 0 else None
         for run in runs:
             if run.cause and repeat:
                 count(run.plan.frames)  # it would go the same way again
                 continue
             run.cause = ""
-            run.advance(watch, count)
-            if repeat == 0 and not run.cause:
+            watch = judge.watch if judge.watches and repeat == 0 else None
+            apart = repeat == 0 and run.apart(watch is not None)
+            if apart:
+                run.examine(watch)
+                if not run.cause:
+                    judge.finish(run)
+            run.advance(None if apart else watch, count)
+            if repeat == 0 and not apart and not run.cause:
                 judge.finish(run)
     for run in runs:
         run.sim.close()
+        run.judged.close()
     judge.judge(runs)
 
 

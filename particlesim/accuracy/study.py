@@ -44,6 +44,8 @@ class Study:
         options: Options of ``build`` that do not vary.
         frames: Of ``settings.dt``; where dt varies, the simulated time stays.
         device, worlds: As for Simulation.
+        seeds: How many seeds errors are of, or which, where ``build`` has an option ``seed`` that
+            is not given; otherwise there is one.
     """
 
     def __init__(
@@ -55,6 +57,7 @@ class Study:
         frames: int | None = None,
         device: Any = None,
         worlds: int | None = None,
+        seeds: int | Iterable[int] = 1,
     ):
         if not callable(build):
             raise TypeError(
@@ -72,6 +75,7 @@ class Study:
                 f"{owner}: settings must be a Settings, got {self.given!r}; use Settings(...)."
             )
         self.options = self.split(options or {}, "options", knobs=())[0]
+        self.seeds = self._seeds(seeds)
         self.settings = self._chosen(self.given, self.options)
         wanted = getattr(module, "frames", FRAMES)
         self.frames = validate.whole(owner, "frames", wanted if frames is None else frames)
@@ -80,18 +84,24 @@ class Study:
         self.known = getattr(module, "error", None)
         self.known_here = self.known is not None and self.frames == wanted
 
-    def seeded(self, count: int) -> list[Study]:
-        """This study with other seeds too, where ``build`` has them and none is given."""
+    def _seeds(self, given: int | Iterable[int]) -> list[int]:
+        """The seeds, or none where there is nothing to choose."""
         first = options_of(self.build).get(SEED)
         if SEED in self.options or not isinstance(first, int):
-            return [self]
-        others = []
-        for k in range(1, count):
-            options = {**self.options, SEED: first + k}
-            others.append(
-                Study(self.owner, self.build, self.given, options, self.frames, self.device)
-            )
-        return [self, *others]
+            return []
+        if isinstance(given, Iterable):
+            return [validate.whole(self.owner, "seeds", each) for each in given]
+        count = validate.whole(self.owner, "seeds", given, minimum=1)
+        return [first + k for k in range(count)]
+
+    def replace(self, **changes: Any) -> Study:
+        """The same scene over other ``frames``, or with other ``seeds``."""
+        given = {"frames": self.frames, "seeds": self.seeds or 1, **changes}
+        return Study(self.owner, self.build, self.given, self.options, device=self.device, **given)
+
+    def alone(self) -> Study:
+        """This study with its first seed only."""
+        return self.replace(seeds=self.seeds[:1] or 1)
 
     def split(
         self, values: Mapping[str, Any], argument: str, knobs: Iterable[str] = KNOBS
@@ -146,12 +156,20 @@ class Study:
         ]
 
     def scenes(self, options: Mapping[str, Any]) -> list[Scene]:
-        """The scenes, one a world."""
-        return batch(self.build(**options), self.worlds)
+        """The scenes, one a world; of the first seed where none is given."""
+        seed = {SEED: self.seeds[0]} if self.seeds else {}
+        return batch(self.build(**{**seed, **options}), self.worlds)
 
     def simulation(self, plan: Plan) -> Simulation:
         """A simulation of a plan, at its start."""
         return Simulation(self.scenes(plan.options), plan.settings, device=self.device)
+
+    def batch(self, plan: Plan) -> Simulation:
+        """A simulation of a plan with a world for each seed, at its start."""
+        seeds = self.seeds if SEED not in plan.options else []
+        each = [{SEED: seed, **plan.options} for seed in seeds] or [plan.options]
+        scenes = [scene for options in each for scene in self.scenes(options)]
+        return Simulation(scenes, plan.settings, device=self.device)
 
     def _chosen(self, settings: Settings, options: dict[str, Any]) -> Settings:
         """The settings, with what is "auto" as the scene's simulation chooses it."""

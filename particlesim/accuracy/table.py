@@ -32,6 +32,16 @@ def amount(value: float, step: int = 1000) -> str:
     return f"{value:.3g} {prefix.upper() if binary else prefix}{binary}"
 
 
+def duration(seconds: float) -> str:
+    """Seconds with a unit, as ``12.3 us``."""
+    if not math.isfinite(seconds):
+        return "-"
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        if abs(seconds) >= 0.9995 * size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns"
+
+
 def write(owner: str, path: Path, content: bytes) -> None:
     """Write a file at once or not at all."""
     with whole(owner, path, "What was there before is left as it is.") as part:

@@ -7,6 +7,7 @@ import inspect
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Annotated, Any
 
 import typer
@@ -24,6 +25,18 @@ ErrorName = Annotated[
     str | None,
     typer.Option(help="known, converged, energy or momentum. Default: known if it is."),
 ]
+Observe = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="Compare this with a reference: position, velocity, energy, kinetic, potential, "
+        "momentum, angular_momentum, virial, or a function of the scene's module.",
+    ),
+]
+Over = Annotated[
+    str | None,
+    typer.Option(help="Error over time: final, max, rms, or mean, of the average."),
+]
 
 
 def tradeoff(
@@ -33,6 +46,9 @@ def tradeoff(
     frames: Frames = None,
     repeats: Annotated[int, typer.Option(min=1, help="Timed runs of each setting.")] = 3,
     error: ErrorName = None,
+    observe: Observe = None,
+    over: Over = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Seeds whose median error counts.")] = 1,
     reference: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME=VALUE", help="What the converged reference takes; repeat."),
@@ -53,6 +69,7 @@ def tradeoff(
 
         if error is not None:
             validate.choice("tradeoff", "--error", error, ERRORS)
+        seen = _observed("tradeoff", module, observe, over)
         varied = parse_vary(vary or ())
         if not varied:
             raise ValueError(
@@ -65,8 +82,9 @@ def tradeoff(
         build, knobs = split_options(module, {**{n: varied[n][0] for n in needed}, **fixed})
         with _one_line_warnings(), meter.count(label(module), at_last="reference") as progress:
             table = sweep(
-                module.build, varied, error=error, reference=parse_options(reference or ()) or None,
-                repeats=repeats, frames=frames, settings=module.settings.replace(**knobs),
+                module.build, varied, error=error, observe=seen, over=over,
+                reference=parse_options(reference or ()) or None, seeds=seeds, repeats=repeats,
+                frames=frames, settings=module.settings.replace(**knobs),
                 options={name: value for name, value in build.items() if name in fixed},
                 bound=bound, device=device, progress=progress,
             )  # fmt: skip
@@ -81,7 +99,13 @@ def tradeoff(
 def tune(
     scene: SceneName,
     error: Annotated[float, typer.Option(help="The error to stay under.")] = 1e-3,
+    budget: Annotated[
+        str | None,
+        typer.Option(metavar="TIME", help="Instead: the least error in this time, as '60 s'."),
+    ] = None,
     by: ErrorName = None,
+    observe: Observe = None,
+    over: Over = None,
     vary: Vary = None,
     options: Options = None,
     frames: Frames = None,
@@ -89,7 +113,7 @@ def tune(
     device: Device = None,
     debug: Debug = False,
 ) -> None:
-    """Find the cheapest settings under an error, and print them as Python."""
+    """Find the cheapest settings under an error, or the best in a time; print them as Python."""
     with opened(debug) as meter:
         module = load(scene, debug)
         from ..accuracy.judging import ERRORS
@@ -97,6 +121,7 @@ def tune(
 
         if by is not None:
             validate.choice("tune", "--by", by, ERRORS)
+        seen = _observed("tune", module, observe, over)
         build, knobs = split_options(module, parse_options(options or ()))
         meter.unit = "settings"
 
@@ -106,9 +131,9 @@ def tune(
 
         with _one_line_warnings():
             found = search(
-                module.build, error, by=by, vary=parse_vary(vary or ()), seeds=seeds,
-                frames=frames, settings=module.settings.replace(**knobs), options=build,
-                device=device, progress=show,
+                module.build, error, budget=budget, by=by, observe=seen, over=over,
+                vary=parse_vary(vary or ()), seeds=seeds, frames=frames, options=build,
+                settings=module.settings.replace(**knobs), device=device, progress=show,
             )  # fmt: skip
         typer.echo(str(found))
 
@@ -138,6 +163,25 @@ def stress(
         typer.echo(str(table))
         if table.count("failed"):
             raise typer.Exit(1)
+
+
+def _observed(owner: str, module: ModuleType, name: str | None, over: str | None) -> Any:
+    """What --observe names: of the module, if it has such a function, or ready."""
+    from ..accuracy.observe import OVER, READY
+
+    if over is not None:
+        validate.choice(owner, "--over", over, OVER)
+    if name is None:
+        return None
+    own = [each for each, value in vars(module).items() if _observes(module, each, value)]
+    validate.choice(owner, "--observe", name, [*own, *READY])
+    return getattr(module, name) if name in own else name
+
+
+def _observes(module: ModuleType, name: str, value: Any) -> bool:
+    """Whether it is a function of the module's own that users may mean."""
+    own = getattr(value, "__module__", None) == module.__name__
+    return inspect.isfunction(value) and own and not name.startswith("_") and name != "build"
 
 
 def _check_outputs(picture: Path | None, table: Path | None, overwrite: bool) -> None:

@@ -15,7 +15,7 @@ import inspect
 import os
 import pkgutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
 from types import ModuleType
@@ -76,6 +76,24 @@ def _load_file(path: Path) -> ModuleType:
     sys.path.append(str(path.parent.resolve()))
     specification.loader.exec_module(module)
     return module
+
+
+def load_function(text: str, option: str) -> Callable[..., Any]:
+    """The function that ``module:function`` or ``file.py:function`` names.
+
+    Raises:
+        ValueError: There is none.
+    """
+    place, colon, name = text.rpartition(":")
+    if not colon or not place or not name.isidentifier():
+        raise ValueError(
+            f"{option} must be MODULE:FUNCTION or FILE.py:FUNCTION, got {text!r}; name one."
+        )
+    module = _load_file(Path(place)) if place.endswith(".py") else importlib.import_module(place)
+    function = getattr(module, name, None)
+    if not callable(function):
+        raise ValueError(f"{option} must name a function of {place}, got {name!r}; define it.")
+    return function
 
 
 def parse_options(assignments: Sequence[str]) -> dict[str, Any]:

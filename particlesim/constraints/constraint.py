@@ -231,7 +231,7 @@ class Constraint(ConstraintBase):
         launch(self.strain_kernel, self.count, inputs, self.model.device)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
-        """Add the virial of the multipliers of the last substep, and C^2 / (2 alpha)."""
+        """Add the virial of the multipliers of the last substep, and the elastic energy."""
         if not self.count:
             return
         seats = self.tuples.seats

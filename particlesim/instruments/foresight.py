@@ -56,8 +56,15 @@ KEPT = 0.08  # of an energy, by "auto": a tenth, less what higher orders add
 LEAST = 0.001  # of the largest kinetic energy: what an energy near zero counts as
 
 
-def look_ahead(loop: Loop, limits: list[Limit]) -> Ahead:
-    """The path ahead of the present state, at which ``limits`` hold."""
+@np.errstate(all="ignore")
+def look_ahead(loop: Loop, limits: list[Limit], share: float = 1.0) -> Ahead:
+    """The path ahead of the present state, at which ``limits`` hold.
+
+    Args:
+        loop: What is in motion.
+        limits: Of the present.
+        share: Of the whole path: how far to look.
+    """
     work = loop.work
     if not 0 < FEW * work <= WORK or not np.isfinite(loop.get("velocity")).all():
         return Ahead(None, math.inf)
@@ -65,7 +72,7 @@ def look_ahead(loop: Loop, limits: list[Limit]) -> Ahead:
     with Probe(loop):  # puts back what the snapshot leaves out
         start = Snapshot(loop)
         try:
-            return _Path(loop, limits, WORK / work).walk()
+            return _Path(loop, limits, share * WORK / work).walk(int(share * STEPS))
         finally:
             start.restore()
             for each in own:
@@ -88,12 +95,12 @@ class _Path:
         self.mass = loop.model.column("mass")
         self.energies = _Energies(loop, self.mass * self.moves)
 
-    def walk(self) -> Ahead:
+    def walk(self, steps: int) -> Ahead:
         loop, t = self.loop, 0.0
         self._settle()
         self.met = self._sizes(0.0)
         mark, h = Snapshot(loop), self._start()
-        for _ in range(STEPS):
+        for _ in range(steps):
             if self.budget <= 0.0:
                 break
             mark.take()

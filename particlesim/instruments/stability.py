@@ -89,6 +89,7 @@ class Stability(Report):
 PROVISIONAL = 1.0 / 60.0  # a frame's time while it is yet to be found
 MANY = 10.0  # times the speed that anything has, or gains in a frame
 FEW = 1e-4  # of the size of the scene: what rounding and stretched springs may be off
+GLANCE = 0.4  # of the path ahead: what a run looks at before it begins
 SAFETY = 0.5  # of the limit, at most, where the settings leave it open
 NEGLIGIBLE = 0.97  # of the tightest limit: what several parts do together matters below it
 
@@ -100,10 +101,13 @@ class StabilityWarning(UserWarning):
     """Settings are past the limit of a scene."""
 
 
-def stability(loop: Loop) -> Stability:
-    """The limits of all parts now and on the path ahead (see ``Simulation.stability``)."""
+def stability(loop: Loop, share: float = 1.0) -> Stability:
+    """The limits of all parts now and on the path ahead (see ``Simulation.stability``).
+
+    ``share``: of that path, how far to look.
+    """
     limits = _limits_now(loop)
-    ahead = look_ahead(loop, limits).limit
+    ahead = look_ahead(loop, limits, share).limit
     limits += [] if ahead is None else [ahead]
     return Stability(_in_order(limits), loop.settings)
 
@@ -112,6 +116,7 @@ def _in_order(limits: list[Limit]) -> list[Limit]:
     return sorted(limits, key=lambda limit: limit.dt)
 
 
+@np.errstate(all="ignore")
 def _limits_now(loop: Loop, quick: bool = False) -> list[Limit]:
     """Those of the present; ``quick``: what the settings surely keep may be smaller than it is."""
     limits: list[Limit] = []
@@ -153,7 +158,7 @@ def warn_if_past(loop: Loop, again: bool = False) -> None:
                 warnings.warn(said, StabilityWarning, stacklevel=3)
     report = Stability(_in_order(_limits_now(loop, quick=True)), loop.settings)
     if not report.safe or not again:
-        report = stability(loop)
+        report = stability(loop, GLANCE)
     if report.safe or report.binding is None:
         return
     _warned.add(loop)

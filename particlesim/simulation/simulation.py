@@ -114,7 +114,7 @@ class Simulation(Reading):
         rounds = self.rounds
         if not self.settings.watchdog:
             return
-        if rounds.made < 0 if first else rounds.due() or self.watchdog.hurried:
+        if rounds.made < 0 if first else rounds.due(self.watchdog.hurried):
             rounds.make()
             self.watchdog.forget()
 

@@ -64,10 +64,41 @@ def test_the_command_with_a_reference(command):
     assert code == 0 and "rms distance from a reference of 64 substeps" in out
 
 
+def test_the_command_over_time(command):
+    code, out, err = command(
+        "--vary", "substeps=1,2", "--set", "height=3", "--observe", "velocity", "--over", "rms",
+        "--reference", "substeps=64",
+    )  # fmt: skip
+    assert (code, err) == (0, "") and "rms difference of velocity from a reference" in out
+    assert "root mean square over all frames" in out
+    code, out, _ = command("--vary", "height=1.0", "--over", "max")
+    assert code == 0 and "against the known answer, the largest of all frames" in out
+
+
+def test_the_command_observes_what_the_scene_names(command, tmp_path):
+    own = "\n\ndef depth(sim):\n    return -sim.position[0, 1]\n"
+    (tmp_path / "falling.py").write_text(SCENE + own)
+    code, out, _ = command(
+        "--vary", "substeps=1,2", "--set", "height=3", "--observe", "depth", "--frames", "2",
+        "--reference", "substeps=64",
+    )  # fmt: skip
+    assert code == 0 and "rms difference of depth from a reference" in out
+
+
+def test_the_command_with_seeds(command, tmp_path):
+    text = SCENE.replace("build(height: float)", "build(height: float = 1.0, seed: int = 0)")
+    (tmp_path / "falling.py").write_text(text)
+    code, out, _ = command("--vary", "substeps=1,2", "--seeds", "3")
+    assert code == 0 and "3 seeds" in out
+
+
 @pytest.mark.parametrize(
     "arguments, message",
     [
         ([], "--vary must be given"),
+        (["--vary", "height=1", "--over", "last"], "--over must be one of final, max, rms, mean"),
+        (["--vary", "height=1", "--observe", "speed"], "--observe must be one of"),
+        (["--vary", "height=1", "--seeds", "3"], "seeds must be of a build with an option seed"),
         (["--vary", "substeps"], "--vary must be NAME=VALUE,VALUE,..., got 'substeps'"),
         (["--vary", "substeps=1,,2"], "--vary must be NAME=VALUE"),
         (["--vary", "substeps=1", "--vary", "substeps=2"], "got 'substeps' twice"),

@@ -29,3 +29,11 @@ def test_command(tmp_path):
         [*command, "--by", "guess"], capture_output=True, text=True, timeout=120, check=False
     )
     assert done.returncode == 2 and done.stderr.count("\n") == 1
+    done = subprocess.run(
+        [*command, "--budget", "1 ms", "--observe", "velocity", "--over", "final"],
+        capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert (
+        "a run of" in done.stdout and "of velocity" in done.stdout and "at the end" in done.stdout
+    )

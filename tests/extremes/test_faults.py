@@ -18,8 +18,6 @@ def cases(rows):
     """The rows as parameters of a test, by name."""
     for row in rows:
         marks = [pytest.mark.slow] if row.slow else []
-        if row.name in automatic.PENDING:
-            marks.append(pytest.mark.xfail(strict=True, reason=automatic.PENDING[row.name]))
         yield pytest.param(row, id=row.name, marks=marks)
 
 

@@ -30,7 +30,8 @@ def ran(name, integrator, substeps):
     return np.array(energies), far
 
 
-@pytest.mark.parametrize("substeps", [1, pytest.param(10, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("substeps", [1, 10])
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("name", STEPS)
 def test_auto_keeps_the_energy(name, integrator, substeps):

@@ -7,16 +7,17 @@ import dataclasses
 import io
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from ...engine.report import grid
 from ...output.files import check_new
-from ..table import amount, shown, write
+from ..table import amount, duration, shown, write
 from .row import Row
 
 FORMATS = (".json", ".csv")
+Cell = Callable[[Row], str]  # what a row has in a column
 
 
 def save(
@@ -60,12 +61,19 @@ def as_csv(rows: Sequence[Row], front: Sequence[Row]) -> str:
 
 def _figures(row: Row, front: Sequence[Row]) -> dict[str, Any]:
     """What was measured, with its units in the names."""
+    several = len(row.errors) > 1
     return {
         "error": row.error,
+        **({"error_low": row.interval.low, "error_high": row.interval.high} if several else {}),
+        **({"relative_error": row.relative} if math.isfinite(row.relative) else {}),
+        **{f"{name}_error": value for name, value in row.parts.items()},
         "diverged": row.diverged,
         "cause": row.cause,
         "wall_seconds_per_simulated_second": row.cost,
+        "cpu_seconds_per_simulated_second": row.cpu_cost,
         "relative_spread": row.spread,
+        "set_up_seconds": row.set_up,
+        "compiling_seconds": row.compiling,
         "particle_substeps_per_second": row.rate,
         "particles": row.particles,
         "array_bytes": row.array_bytes,
@@ -84,21 +92,55 @@ def _plain(value: Any) -> Any:
     return value if value is None or isinstance(value, bool | int | str) else str(value)
 
 
-def lines(names: Iterable[str], rows: Sequence[Row], front: Sequence[Row]) -> list[str]:
-    """The table for people: one line a row, a star on the Pareto front."""
-    names = list(names)
-    measured = ("error", "s per s", "spread", "particle-substeps/s", "arrays")
-    heads = [(name, "right") for name in (*names, *measured)]
-    return grid([*heads, ("", "left")], [_cells(row, names, front) for row in rows])
+def lines(
+    names: Iterable[str], rows: Sequence[Row], front: Sequence[Row], near: Sequence[Row], seeds: int
+) -> list[str]:
+    """The table for people: one line a row, a star on the Pareto front, a tilde near it."""
+    columns = _columns(list(names), rows, seeds)
+    body = [
+        [*(cell(row) for cell in columns.values()), _mark(row, front, near)]
+        for row in rows
+    ]  # fmt: skip
+    return grid([*((name, "right") for name in columns), ("", "left")], body)
 
 
-def _cells(row: Row, names: list[str], front: Sequence[Row]) -> list[str]:
-    star = "*" if any(row is each for each in front) else ""
-    return [
-        *(shown(row.values[name]) for name in names),
-        *(shown(value) if math.isfinite(value) else "-" for value in (row.error, row.cost)),
-        f"{100 * row.spread:.0f} %" if len(row.costs) > 1 else "-",
-        amount(row.rate),
-        f"{amount(row.array_bytes, 1024)}B",
-        "diverged" if row.diverged else star,
-    ]
+def _columns(names: list[str], rows: Sequence[Row], seeds: int) -> dict[str, Cell]:
+    """The columns, of what there is to show, and what each row has in them."""
+    columns: dict[str, Cell] = {name: _value(name) for name in names}
+    columns["error"] = lambda row: _number(row.error)
+    if seeds > 1:
+        columns["95 %"] = lambda row: " - ".join(_number(each) for each in row.interval)
+    if any(math.isfinite(row.relative) for row in rows):
+        columns["relative"] = lambda row: _number(row.relative)
+    for part in {name: None for row in rows for name in row.parts}:
+        columns[part] = _part(part)
+    columns["s per s"] = lambda row: _number(row.cost)
+    if any(row.cpu_costs for row in rows):
+        columns["cpu s per s"] = lambda row: _number(row.cpu_cost)
+    columns["spread"] = lambda row: f"{100 * row.spread:.0f} %" if len(row.costs) > 1 else "-"
+    if any(math.isfinite(row.set_up) for row in rows):
+        columns["set-up"] = lambda row: duration(row.set_up)
+        columns["compiling"] = lambda row: duration(row.compiling)
+    columns["particle-substeps/s"] = lambda row: amount(row.rate)
+    columns["arrays"] = lambda row: f"{amount(row.array_bytes, 1024)}B"
+    return columns
+
+
+def _value(name: str) -> Cell:
+    return lambda row: shown(row.values[name])
+
+
+def _part(name: str) -> Cell:
+    return lambda row: _number(row.parts.get(name, math.nan))
+
+
+def _number(value: float) -> str:
+    return shown(value) if math.isfinite(value) else "-"
+
+
+def _mark(row: Row, front: Sequence[Row], near: Sequence[Row]) -> str:
+    if row.diverged:
+        return "diverged"
+    if any(row is each for each in front):
+        return "*"
+    return "~" if any(row is each for each in near) else ""

@@ -12,10 +12,13 @@ import numpy as np
 
 from ... import validate
 from ...engine.report import Report
-from ..table import amount
+from ..statistics import Order, independent
 from . import output
+from .costs import CostModel, along_of, models, speedups
+from .notes import credible, notes
+from .orders import fitted_order
 from .plot import plot
-from .row import Row, fitted_order
+from .row import Row
 
 STEPS = ("dt",)  # of these less is finer
 
@@ -34,6 +37,10 @@ class Tradeoff(Report):
         device: Where it ran.
         bound: Error beyond which a run counts as diverged.
         process_bytes: Most memory the process has held so far; 0: not known.
+        scale: What errors are compared with, the largest change of what is observed; nan: nothing.
+        floor: How far off the reference may itself be: smaller errors mean nothing.
+        conserved: Whether the error is of what a right run would keep.
+        seeds: How many seeds the errors are of.
     """
 
     scene: str
@@ -45,6 +52,10 @@ class Tradeoff(Report):
     device: str = ""
     bound: float = math.inf
     process_bytes: int = 0
+    scale: float = math.nan
+    floor: float = 0.0
+    conserved: bool = False
+    seeds: int = 1
 
     @property
     def stable(self) -> list[Row]:
@@ -57,26 +68,51 @@ class Tradeoff(Report):
         return [row for row in self.rows if row.diverged]
 
     def pareto(self) -> list[Row]:
-        """The rows than which none is both as cheap and as accurate, the cheapest first."""
+        """The rows than which none is both as cheap and as accurate, the cheapest first.
+
+        Of several seeds a row counts as more accurate only if it is not so by chance.
+        """
         front: list[Row] = []
         for row in sorted(self.stable, key=lambda row: (row.cost, row.error)):
-            if not front or row.error < front[-1].error:
+            if not front or (row.error < front[-1].error and row.surely_better(front[-1])):
                 front.append(row)
         return front
+
+    def contenders(self) -> list[Row]:
+        """Rows beside the front that its costs cannot be told from.
+
+        What keeps them off is cheaper by less than both spread from repeat to repeat.
+        """
+        front = self.pareto()
+        found = []
+        for row in self.stable:
+            rivals = [each for each in front if not row.surely_better(each)]
+            if not any(row is each for each in front) and all(
+                row.cost * (1 - row.spread) < each.cost * (1 + each.spread) for each in rivals
+            ):
+                found.append(row)
+        return found
 
     def cheapest(self, *, error: float) -> Row:
         """The cheapest row whose error is at most ``error``.
 
         Raises:
-            ValueError: There is none; the message says how small the error got.
+            ValueError: There is none (the message says how small the error got), or the reference
+                is itself farther off.
         """
-        error = validate.number("Tradeoff.cheapest", "error", error, minimum=0.0)
+        owner = "Tradeoff.cheapest"
+        error = validate.number(owner, "error", error, minimum=0.0)
+        if error < self.floor < math.inf:
+            raise validate.fail(
+                owner, "error", f"be at least {self.floor:.3g}, by which the reference may be off",
+                error, "use fewer frames, averages over time, or another error",
+            )  # fmt: skip
         for row in self.stable:
             if row.error <= error:
                 return row
         least = min((row.error for row in self.stable), default=math.inf)
         raise validate.fail(
-            "Tradeoff.cheapest", "error", f"be at least {least:.3g}, the smallest of the sweep",
+            owner, "error", f"be at least {least:.3g}, the smallest of the sweep",
             error, "vary towards finer settings",
         )  # fmt: skip
 
@@ -93,6 +129,8 @@ class Tradeoff(Report):
             )  # fmt: skip
         return self.stable[0]
 
+    # Orders -------------------------------------------------------------------------------------
+
     def order(self, knob: str, **others: Any) -> float:
         """Order of convergence p of a knob: error ~ knob^-p, or dt^p for dt.
 
@@ -108,6 +146,13 @@ class Tradeoff(Report):
         Raises:
             ValueError: Not a number, or fewer than two settings with an error above 0.
         """
+        return self.order_fit(knob, **others).value
+
+    def order_fit(self, knob: str, **others: Any) -> Order:
+        """:meth:`order` with its standard error, and how far off the line the worst point is.
+
+        Of several seeds the error is that of how the seeds' own orders differ, if that is larger.
+        """
         owner, names = "Tradeoff.order", list(self.vary)
         validate.choice(owner, "knob", knob, names)
         validate.known(owner, others, [name for name in names if name != knob], "name")
@@ -116,32 +161,93 @@ class Tradeoff(Report):
                 raise validate.fail(
                     owner, f"values of {knob}", "be numbers above 0", value, "vary another knob"
                 )
-        groups: dict[str, list[tuple[float, float]]] = {}
-        for row in self.stable:
-            rest = {name: value for name, value in row.values.items() if name != knob}
-            if row.error > 0 and others.items() <= rest.items():
-                groups.setdefault(repr(rest), []).append((row.values[knob], row.error))
-        points = [np.array(group).T for group in groups.values()]
-        usable = [(x, y) for x, y in points if len(np.unique(x)) > 1]
-        if not usable:
+        fit = self._fit(knob, others, None)
+        if fit is None:
             raise validate.fail(
                 owner, f"settings that differ in {knob}", "be at least two with an error above 0",
                 [row.error for row in self.rows], "vary it further",
             )  # fmt: skip
-        whole = all(isinstance(value, int) for value in self.vary[knob])
-        finer = -1 if knob in STEPS else 1 if whole else 0
-        return fitted_order(usable, finer)
+        if self.seeds > 1:
+            each = [self._fit(knob, others, seed) for seed in range(self.seeds)]
+            own = independent([one.value for one in each if one is not None])
+            if own.error > fit.error or fit.degrees < 1:
+                return Order(fit.value, own.error, int(own.degrees), fit.off)
+        return fit
 
-    def orders(self) -> dict[str, float]:
-        """The order of every knob that has three values or more and can be fitted."""
+    def _fit(self, knob: str, others: dict[str, Any], seed: int | None) -> Order | None:
+        """The fit of medians, or of one seed; None where there are too few points."""
+        groups: dict[str, list[tuple[float, float]]] = {}
+        for row in self.stable:
+            rest = {name: value for name, value in row.values.items() if name != knob}
+            error = row.error if seed is None else row.errors[seed]
+            if error > 0 and others.items() <= rest.items():
+                groups.setdefault(repr(rest), []).append((row.values[knob], error))
+        points = [np.array(group).T for group in groups.values()]
+        usable = [(x, y) for x, y in points if len(np.unique(x)) > 1]
+        if not usable:
+            return None
+        whole = all(isinstance(value, int) for value in self.vary[knob])
+        return fitted_order(usable, -1 if knob in STEPS else 1 if whole else 0)
+
+    def order_fits(self) -> dict[str, Order]:
+        """The fit of every knob that has three values or more and can be fitted."""
         found = {}
         for knob, values in self.vary.items():
             if len(values) > 2:
                 try:
-                    found[knob] = self.order(knob)
+                    found[knob] = self.order_fit(knob)
                 except ValueError:
                     continue
         return found
+
+    def orders(self) -> dict[str, float]:
+        """The orders that the errors bear out: they fall, and on a line."""
+        return {knob: fit.value for knob, fit in self.order_fits().items() if credible(fit)}
+
+    # Costs --------------------------------------------------------------------------------------
+
+    def cost_models(self) -> list[CostModel]:
+        """What frames cost by their substeps and particles, of every way of running them."""
+        return models(self.rows)
+
+    def cost_of(
+        self, *, substeps: int, dt: float | None = None, particles: int | None = None, **way: Any
+    ) -> float:
+        """Wall seconds per simulated second of what was not run, by the model of costs.
+
+        Args:
+            substeps: Of a frame.
+            dt: Of a frame [s]; None: that of the first row.
+            particles: How many; None where their number does not vary.
+            **way: Values of the other names that vary, as ``precision="float64"``.
+
+        Raises:
+            ValueError: No such way, or not enough rows of it to know.
+        """
+        owner = "Tradeoff.cost_of"
+        substeps = validate.whole(owner, "substeps", substeps, minimum=1)
+        found = [each for each in self.cost_models() if way.items() <= each.values.items()]
+        if len(found) != 1:
+            raise validate.fail(
+                owner, "names", "choose one model of costs", way,
+                f"there are {[str(each) for each in self.cost_models()]}",
+            )  # fmt: skip
+        if particles is None and found[0].particles is None:
+            raise validate.fail(
+                owner, "particles", "be given where their number varies", None, "say how many"
+            )
+        step = self.rows[0].settings.dt if dt is None else validate.number(owner, "dt", dt, above=0)
+        return found[0].seconds(substeps, particles or 0) / step
+
+    def speedups(self, error: float | None = None) -> list[str]:
+        """How many times as fast one way is as another at the same error, in words.
+
+        Args:
+            error: At which; None: the smallest power of ten that two ways reach.
+        """
+        return speedups(self.rows, along_of(self.vary), error) if self.vary else []
+
+    # Output -------------------------------------------------------------------------------------
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the table as ``.json``, everything, or ``.csv``, one line a row.
@@ -167,19 +273,8 @@ class Tradeoff(Report):
         Raises:
             ImportError: matplotlib is missing. ValueError: Another suffix, or a file that exists.
         """
-        about = f"{self.scene}: error", self.error
+        about = self.scene, self.error
         plot(Path(path), overwrite, about, self.vary, self.rows, self.pareto())
 
     def __str__(self) -> str:
-        runs = "1 run" if self.repeats == 1 else f"median of {self.repeats} runs"
-        notes = [f"order of convergence of {knob}: {p:.2f}" for knob, p in self.orders().items()]
-        if self.process_bytes:
-            notes.append(f"most memory of the whole process: {amount(self.process_bytes, 1024)}B")
-        return "\n".join([
-            f"{self.scene}: {self.duration:g} s on {self.device}, {runs}",
-            f"error: {self.error}",
-            "s per s: wall seconds per simulated second; *: nothing is both cheaper and more "
-            "accurate",
-            "", *output.lines(self.vary, self.rows, self.pareto()), "",
-            *notes, *(f"diverged, {row.label()}: {row.cause}" for row in self.diverged),
-        ])  # fmt: skip
+        return "\n".join(notes(self))

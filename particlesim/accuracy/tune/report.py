@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -24,6 +25,10 @@ class Trial:
         cost: Wall seconds per simulated second.
         cause: Why it failed, if it did.
         spread: By how much the errors of the seeds differ.
+        limit: The error to hold the tolerance against; None: as far again as those of the seeds
+            differ.
+        along: The largest error before the end, at times at which it is known to be one.
+        series: Errors (times, seeds) where they were looked at along the run.
     """
 
     values: dict[str, Any]
@@ -33,11 +38,14 @@ class Trial:
     cost: float
     cause: str = ""
     spread: float = 0.0
+    limit: float | None = dataclasses.field(default=None, compare=False)
+    along: float = dataclasses.field(default=0.0, compare=False)
+    series: Any = dataclasses.field(default=None, repr=False, compare=False)
 
     @property
     def bound(self) -> float:
         """What the error of yet another seed may be: as far again as those tried differ."""
-        return self.error + self.spread
+        return self.error + self.spread if self.limit is None else self.limit
 
     def __str__(self) -> str:
         knobs = assignments(self.values, 4)
@@ -56,6 +64,11 @@ class Tuned(Report):
         trials: All that was tried, in order.
         seeds: How many seeds each was tried with.
         device: Where.
+        margin: Part of the tolerance that was stayed under.
+        budget: Seconds that a run was allowed to take, where that was asked; else None.
+        longer: Part of the run by which it was looked at for longer, the error included.
+        seconds: Of a run.
+        floor: How far off the reference may itself be.
     """
 
     scene: str
@@ -65,6 +78,11 @@ class Tuned(Report):
     trials: Sequence[Trial]
     seeds: int
     device: str
+    margin: float = 1.0
+    budget: float | None = None
+    longer: float = 0.0
+    seconds: float = math.nan
+    floor: float = 0.0
 
     @property
     def settings(self) -> Settings:
@@ -78,8 +96,8 @@ class Tuned(Report):
 
     @property
     def error(self) -> float:
-        """The largest error of all seeds."""
-        return self.best.error
+        """The largest error of all seeds, at all times at which it was held to the tolerance."""
+        return max(self.best.error, self.best.along)
 
     @property
     def cost(self) -> float:
@@ -93,11 +111,19 @@ class Tuned(Report):
 
     def __str__(self) -> str:
         build = ", ".join(f"{name}={value!r}" for name, value in self.options.items())
+        if self.budget is None:
+            asked = f"error {self.error:.3g} of {self.tolerance:g} allowed"
+        else:
+            asked = f"error {self.error:.3g}, a run of {self.seconds:.3g} s of {self.budget:g} s"
+        held = f"held to {100 * self.margin:.0f} % of it" if self.budget is None else "the least"
+        longer = f", {100 * self.longer:.0f} % longer than the run" if self.longer else ""
+        reference = f"; the reference is off by {self.floor:.2g}" if self.floor else ""
         return (
-            f"{self.scene} on {self.device}: error {self.error:.3g} of {self.tolerance:g} "
-            f"allowed, {self.cost:.3g} wall seconds per simulated second\n"
+            f"{self.scene} on {self.device}: {asked}, "
+            f"{self.cost:.3g} wall seconds per simulated second\n"
             f"error: {self.measure}, the largest of {self.seeds} "
-            f"{'seeds' if self.seeds > 1 else 'run'}; {len(self.trials)} settings tried\n\n"
+            f"{'seeds' if self.seeds > 1 else 'run'}, {held}{longer}{reference}; "
+            f"{len(self.trials)} settings tried\n\n"
             f"{self.line}{f'  # build({build})' if build else ''}"
         )
 

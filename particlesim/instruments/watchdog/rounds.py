@@ -10,7 +10,7 @@
 What is found in two rounds that follow one another is told: a start from rest has no kinetic energy
 to compare with yet, and one that does not fit its constraints eases.
 
-A round takes as long as some hundred substeps of a small scene. It is made after 1, 2, 4, 8 ...
+A round takes as long as a thousand substeps of a small scene. It is made after 8, 16, 32 ...
 frames, and from then on so seldom that it is under 2 % of the time, by a rule of the scene alone;
 and whenever something has become half as fast again. Nothing of the motion depends on it.
 """
@@ -37,6 +37,7 @@ from .limits import GROWN, Limits
 DRIFT = 0.1  # of the largest kinetic energy
 UNMET = 0.02  # of a tuple's extent
 DEEP = 0.2  # of a radius
+FIRST = 8  # frames: what is ahead of a start is looked at as a run begins
 SHARE = 50  # times its own cost, from one round to the next
 ROUND = 6e6  # what a round costs beside three evaluations of the forces, in pairs of these
 SUBSTEP = 2e3  # and a substep beside one
@@ -65,9 +66,10 @@ class Rounds:
         """These worlds were written from outside: their energy is another."""
         self.start[list(worlds)] = np.nan
 
-    def due(self) -> bool:
-        """Whether it is time for a round."""
-        return self.loop.frame >= self.next or self.loop.frame < self.made
+    def due(self, hurried: bool) -> bool:
+        """Whether it is time for a round; ``hurried``: something has become fast."""
+        frame = self.loop.frame
+        return frame >= self.next or frame < self.made or (hurried and frame >= FIRST)
 
     def make(self) -> None:
         """Look, tell, and say when to look again."""
@@ -81,7 +83,7 @@ class Rounds:
         self.made = loop.frame
         work, settings = loop.work, loop.settings
         most = SHARE * (ROUND + 3.0 * work) / (settings.substeps * (SUBSTEP + work))
-        self.next = loop.frame + max(1, min(loop.frame, int(most) + 1))
+        self.next = loop.frame + max(1, min(max(loop.frame, FIRST), int(most) + 1))
 
     def _limits(self) -> None:
         """Asked again where the motion has become faster, or stronger; at the start by the run."""
