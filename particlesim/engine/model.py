@@ -13,10 +13,10 @@ from .. import validate
 from ..kernels.engine.loops import Periodicity, box_type
 from ..kernels.precision import PRECISIONS, structure
 from ..kernels.self_check import fast_ways
+from ..scene import ranges
 from ..scene.group import select
 from ..scene.scene import Scene
 from ..scene.settings import Settings
-from . import ranges
 from .start import start_warp
 
 ROOM = 8  # powers of two that a unit keeps from the ends of a precision
@@ -153,7 +153,7 @@ class Model:
         return wp.array(host, dtype=kind, device=self.device)
 
     def fits(self, owner: str, columns: Mapping[str, np.ndarray]) -> None:
-        """Refuse numbers that the kernels' precision cannot hold (see :func:`.ranges.fits`)."""
+        """Refuse numbers that the kernels' precision cannot hold (see ``scene.ranges``)."""
         ranges.fits(owner, columns, self.precision.numpy)
 
     def squares_fit(self, owner: str, name: str, lengths: Any) -> None:

@@ -81,7 +81,7 @@ def law_of_powers(u):
 
 def charges(u):
     scene = particles(
-        u, TRIANGLE, SPIN, mass=(1.0, 2.0, 1.5), charge=np.array((1.0, -1.0, 0.5)) * u.charge
+        u, TRIANGLE, SPIN, mass=(1.0, 2.0, 1.5), charge=np.array((1.0, 2.0, 0.5)) * u.charge
     )
     scene.add_interaction(ps.PairPotential(coulomb, cutoff=None, constant=u.of(3, 1, -2, -2)))
     return scene

@@ -69,7 +69,7 @@ def test_energies_beyond_single_precision(simulate):
         (lambda: ps.Contact(), "Contact: diameter"),
         (lambda: ps.PlaneBoundary((0, -1, 0), (0, 1, 0)), "PlaneBoundary: diameter"),
         (lambda: ps.LennardJones(cutoff=2.5), "LennardJones: cutoff or spacing"),
-        (lambda: ps.Gravity(), "Gravity: spacing"),
+        (lambda: ps.Gravity(softening=0.5), "Gravity: spacing"),
         (
             lambda: ps.SPH(smoothing_length=3.0, equation_of_state=ps.Polytrope(1.0, 1.0)),
             "SPH: smoothing_length",
