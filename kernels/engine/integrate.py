@@ -18,7 +18,8 @@ def motion_type(precision: Precision) -> Any:
         "v": wp.array(dtype=vec3),
         "w": wp.array(dtype=real),
         "f": wp.array(dtype=vec3),
-        "f_previous": wp.array(dtype=vec3),
+        "v_half": wp.array(dtype=vec3),
+        "v_half_error": wp.array(dtype=vec3),
         "x_error": wp.array(dtype=vec3),
         "v_error": wp.array(dtype=vec3),
         "x_previous": wp.array(dtype=vec3),
@@ -47,31 +48,22 @@ def compensated_sum(precision: Precision) -> wp.Function:
 
 def motion_functions(
     precision: Precision, forces: bool, compensated: bool
-) -> tuple[wp.Function, wp.Function, wp.Function]:
-    """``change(i, f, dt, m) -> v``: v += w f dt; ``kick(i, dt, m) -> v``: by the present force, if
-    there are any; and ``move(i, dx, m)``: x += dx.
-    """
+) -> tuple[wp.Function, wp.Function]:
+    """``kick(i, dt, m) -> v``: v += w f dt; and ``move(i, dx, m)``: x += dx."""
     vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
     add = compensated_sum(precision)
 
-    def change(i: int, f: vec3, dt: real, m: Motion):
-        v = m.v[i]
-        dv = f * (m.w[i] * dt)
-        if wp.static(compensated):
-            v, error = add(v, dv, m.v_error[i])
-            m.v_error[i] = error
-        else:
-            v = v + dv
-        m.v[i] = v
-        return v
-
-    change = function(change)
-
     def kick(i: int, dt: real, m: Motion):
-        if wp.static(not forces):
-            return m.v[i]
-        else:
-            return change(i, m.f[i], dt, m)
+        v = m.v[i]
+        if wp.static(forces):
+            dv = m.f[i] * (m.w[i] * dt)
+            if wp.static(compensated):
+                v, error = add(v, dv, m.v_error[i])
+                m.v_error[i] = error
+            else:
+                v = v + dv
+            m.v[i] = v
+        return v
 
     def move_by(i: int, dx: vec3, m: Motion):
         x = m.x[i]
@@ -82,7 +74,7 @@ def motion_functions(
             x = x + dx
         m.x[i] = x
 
-    return change, function(kick), function(move_by)
+    return function(kick), function(move_by)
 
 
 def wrap_function(
@@ -137,13 +129,11 @@ def integration_kernels(
     precision: Precision, periodic: Periodicity, forces: bool, compensated: bool,
     constrained: bool, remember: bool,
 ) -> SimpleNamespace:  # fmt: skip
-    """The kernels for what a scene has.
-
-    forces: there are forces. compensated: Kahan sums. constrained: corrections follow.
-    remember: keep the positions at the start of the substep.
+    """The kernels for a scene with forces, Kahan sums, corrections that follow; ``remember``: the
+    positions at the start of the substep are kept.
     """
     vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
-    change, kick, move = motion_functions(precision, forces, compensated)
+    kick, move = motion_functions(precision, forces, compensated)
     wrap = wrap_function(move, precision, compensated, remember)
     wraps = bool(periodic)
 
@@ -166,10 +156,21 @@ def integration_kernels(
         kick(first + wp.tid(), dt, m)
 
     @register
-    def correct(first: int, dt: real, m: Motion):
-        """v += w (f - f_previous) dt: the kick that foresaw the forces has the present ones."""
+    def foresee(first: int, dt: real, m: Motion):
+        """v += w f dt, as the forces will leave it if they stay; what it was is kept."""
         i = first + wp.tid()
-        change(i, m.f[i] - m.f_previous[i], dt, m)
+        m.v_half[i] = m.v[i]
+        if wp.static(compensated):
+            m.v_half_error[i] = m.v_error[i]
+        kick(i, dt, m)
+
+    @register
+    def go_back(first: int, m: Motion):
+        """v is again what it was."""
+        i = first + wp.tid()
+        m.v[i] = m.v_half[i]
+        if wp.static(compensated):
+            m.v_error[i] = m.v_half_error[i]
 
     @register
     def follow_corrections(first: int, inverse_dt: real, m: Motion):
@@ -180,61 +181,9 @@ def integration_kernels(
             wrap(i, m)
 
     return SimpleNamespace(
-        advance=advance, kick_only=kick_only, correct=correct,
+        advance=advance, kick_only=kick_only, foresee=foresee, go_back=go_back,
         follow_corrections=follow_corrections,
     )  # fmt: skip
-
-
-@functools.cache
-def implicit_kernels(precision: Precision, predicted: bool) -> SimpleNamespace:
-    """The kernels of forces that are implicit in the velocity.
-
-    predicted: v has had a kick of f_previous dt already.
-    """
-    vec3, real, mat33, Motion = (
-        precision.vec3, precision.scalar, precision.mat33, motion_type(precision)
-    )  # fmt: skip
-
-    @register
-    def lead(
-        first: int,
-        dt: wp.float64,
-        m: Motion,
-        slope: wp.array(dtype=mat33),
-        lead_out: wp.array(dtype=vec3),
-    ):
-        """u = (1 - w (df/dv) dt)^-1 w f dt, by which v + u = v + w f(v + u) dt to first order.
-
-        In double precision, as a determinant is a product of three.
-        """
-        i = first + wp.tid()
-        f = m.f[i]
-        if wp.static(predicted):
-            f = f - m.f_previous[i]
-        a = wp.float64(m.w[i]) * dt
-        J = slope[i]
-        A = wp.identity(n=3, dtype=wp.float64)
-        for r in range(3):
-            for c in range(3):
-                A[r, c] -= a * wp.float64(J[r, c])
-        u = wp.inverse(A) * wp.vec3d(wp.float64(f[0]), wp.float64(f[1]), wp.float64(f[2])) * a
-        lead_out[i] = vec3(real(u[0]), real(u[1]), real(u[2]))
-
-    @register
-    def settle(first: int, dt: wp.float64, m: Motion, lead: wp.array(dtype=vec3)):
-        """f = u / (w dt). Not f + (df/dv) u, of which nothing may be left but rounding."""
-        i = first + wp.tid()
-        a = wp.float64(m.w[i]) * dt
-        if a > wp.float64(0.0):
-            u = lead[i]
-            f = vec3(
-                real(wp.float64(u[0]) / a), real(wp.float64(u[1]) / a), real(wp.float64(u[2]) / a)
-            )
-            if wp.static(predicted):
-                f = f + m.f_previous[i]
-            m.f[i] = f
-
-    return SimpleNamespace(lead=lead, settle=settle)
 
 
 @functools.cache

@@ -74,10 +74,10 @@ def _slope(
 
 @functools.cache
 def follow_kernel(
-    law: wp.Function, arguments: tuple[str, ...], by: int, precision: Precision, data: Any,
-    params: Any,
+    law: wp.Function, arguments: tuple[str, ...], by: int, damps: bool, precision: Precision,
+    data: Any, params: Any,
 ) -> wp.Kernel:  # fmt: skip
-    """Kernel: f += (df/dv) u on each member, v the law's argument ``by``."""
+    """Kernel: f += (df/dv) u on each member, v the law's argument ``by``; see ``follow``."""
     slope = _slope(law, arguments, by, precision, data, params)
 
     @register
@@ -93,7 +93,10 @@ def follow_kernel(
         k = first + wp.tid()
         i = members[k]
         w = world[k]
-        f_io[i] = f_io[i] + slope(i, w, d.x[i], d, parameters[w]) * lead[i]
+        J = slope(i, w, d.x[i], d, parameters[w])
+        if wp.static(not damps):
+            J = (J - wp.transpose(J)) * precision.scalar(0.5)
+        f_io[i] = f_io[i] + J * lead[i]
 
     return particle_follow
 
@@ -103,8 +106,9 @@ def slope_kernel(
     law: wp.Function, arguments: tuple[str, ...], by: int, precision: Precision, data: Any,
     params: Any,
 ) -> wp.Kernel:  # fmt: skip
-    """Kernel: the slope += df/dv of each member, v the law's argument ``by``."""
+    """Kernel: slope += df/dv and own += f of each member, v the law's argument ``by``."""
     slope = _slope(law, arguments, by, precision, data, params)
+    evaluate = _evaluation(law, arguments, precision, data, params, None, force=True)
 
     @register
     def particle_slope(
@@ -114,11 +118,13 @@ def slope_kernel(
         parameters: wp.array(dtype=params),
         d: data,
         slope_io: wp.array(dtype=precision.mat33),
+        own_io: wp.array(dtype=precision.vec3),
     ):
         k = first + wp.tid()
         i = members[k]
         w = world[k]
         slope_io[i] = slope_io[i] + slope(i, w, d.x[i], d, parameters[w])
+        own_io[i] = own_io[i] + evaluate(i, w, d.x[i], d, parameters[w])
 
     return particle_slope
 

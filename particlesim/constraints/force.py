@@ -36,6 +36,7 @@ class ConstraintForce(Interaction):
     """
 
     requires = frozenset({"force"})
+    reads_velocity = True  # whatever the damping of a world is: worlds go as they go alone
 
     def __init__(self, constraint: Any):
         self.constraint = constraint
@@ -65,8 +66,7 @@ class ConstraintForce(Interaction):
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
         self.tuples = Tuples(self.name, model, [peer.constraint for peer in self.peers])
-        self.reads_velocity = any(peer.constraint.damping.any() for peer in self.peers)
-        self.conservative = not self.reads_velocity
+        self.conservative = not any(peer.constraint.damping.any() for peer in self.peers)
         self.seats = self.tuples.seats
         self.count = len(self.seats.particle)
 

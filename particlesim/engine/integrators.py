@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from .. import validate
-from ..kernels.engine.copy import copy_kernel
+from ..kernels.engine.implicit import lead_kernel, settle_kernel
 from ..kernels.engine.integrate import (
-    implicit_kernels,
     integration_kernels,
     motion_type,
     tick_kernel,
@@ -27,10 +26,12 @@ class Integrator:
     ``advance``, made of :meth:`kick`, :meth:`drift` and :meth:`move`. Its class is given to the
     settings, ``Settings(integrator=YourClass)``, and ``model`` and ``state`` are there to be read.
 
-    A force on a particle that depends on its velocity, as drag and a magnetic field do, is taken at
-    the velocity half a kick ahead, v' = v + w f(v') dt / 2, to first order in v' - v (Rosenbrock
-    1963): a kick then turns a charge without changing its speed (Boris 1970) and lets drag decay by
-    (1 - gamma dt / 2) / (1 + gamma dt / 2) (Crank and Nicolson 1947).
+    What turns the velocity of a particle, as a magnetic field does, is taken at the velocity half a
+    kick ahead, v' = v + w f(v') dt / 2, to first order in v' - v (Rosenbrock 1963): a kick then
+    turns it without changing its speed (Boris 1970). A method of second order ``damps`` so, too:
+    drag takes the velocity to (1 - gamma dt / 2) / (1 + gamma dt / 2) of it (Crank and Nicolson
+    1947), with all other forces. In one of first order drag is explicit, and nothing where nothing
+    moves, as where constraints hold it.
 
     ``order`` is that of convergence in ``dt``. ``carries_forces`` says that a substep starts from
     the forces that the last one ended with; such a method takes no constraints.
@@ -55,6 +56,12 @@ class Integrator:
 
     order: int = 1
     carries_forces = False
+
+    @property
+    def damps(self) -> bool:
+        """Whether damping is implicit in the velocity, as turning is."""
+        return self.order > 1
+
     host = False  # whether it works in Python, and so has to be called in every substep
 
     def __init__(
@@ -77,15 +84,16 @@ class Integrator:
             names |= {"image", "world"}
         self.predicted = predicted and forces and self.carries_forces
         if implicit:
-            names |= {"force_slope", "velocity_lead"}
+            names |= {"force_slope", "implicit_force", "velocity_lead"}
         if self.predicted:
-            names |= {"previous_force"}
+            names |= {"half_velocity"} | (
+                {"half_velocity_error"} if settings.compensated else set()
+            )
         state.require(names)
         self.forces, self.constrained = forces, constrained
         self.kernels = integration_kernels(
             model.precision, model.periodic, forces, settings.compensated, constrained, remember
         )
-        self.implicit_kernels = implicit_kernels(model.precision, self.predicted)
         self.motion = _motion(model, state)
 
     @property
@@ -114,14 +122,18 @@ class Integrator:
 
     def lead(self, dt: float) -> None:
         """How far the velocity of the implicit forces is ahead, in ``state.velocity_lead``."""
-        state, kernel = self.state, self.implicit_kernels.lead
-        inputs = [0.5 * dt, self.motion, state.force_slope, state.velocity_lead]
-        launch(kernel, self.count, inputs, self.model.device)
+        self._implicitly(lead_kernel, dt)
 
     def settle(self, dt: float) -> None:
         """The sum of all forces is what takes the velocity there."""
-        inputs = [0.5 * dt, self.motion, self.state.velocity_lead]
-        launch(self.implicit_kernels.settle, self.count, inputs, self.model.device)
+        self._implicitly(settle_kernel, dt)
+
+    def _implicitly(self, kernel: Any, dt: float) -> None:
+        state, model = self.state, self.model
+        names = ("force_slope", "implicit_force", "velocity_lead")
+        inputs = [0.5 * dt, self.motion, *(state[name] for name in names)]
+        made = kernel(model.precision, self.damps, self.predicted)
+        launch(made, self.count, inputs, model.device)
 
     def kick(self, dt: float) -> None:
         """v += w f dt, w = 1/m; nothing in a scene without forces."""
@@ -170,15 +182,12 @@ class VelocityVerlet(Integrator):
     def begin(self, dt: float) -> None:
         self.move(0.5 * dt, dt)
         if self.predicted:
-            force, previous = self.state.force, self.state.previous_force
-            launch(copy_kernel(force.dtype), self.count, [force, previous], self.model.device)
-            self.kick(0.5 * dt)
+            self._launch(self.kernels.foresee, 0.5 * dt)
 
     def advance(self, dt: float) -> None:
         if self.predicted:
-            self._launch(self.kernels.correct, 0.5 * dt)
-        else:
-            self.kick(0.5 * dt)
+            self._launch(self.kernels.go_back)
+        self.kick(0.5 * dt)
 
 
 METHODS: dict[str, type[Integrator]] = dict(
@@ -209,7 +218,7 @@ def _motion(model: Model, state: State) -> Any:
         "x": "position", "v": "velocity", "w": "inverse_mass", "f": "force",
         "x_error": "position_error", "v_error": "velocity_error",
         "x_previous": "previous_position", "correction": "correction", "image": "image",
-        "f_previous": "previous_force",
+        "v_half": "half_velocity", "v_half_error": "half_velocity_error",
         "world": "world",
     }  # fmt: skip
     for field, name in names.items():

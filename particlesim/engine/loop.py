@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
@@ -60,6 +61,9 @@ class Loop:
                 "Settings", "integrator", "be symplectic_euler in a scene with constraints",
                 settings.plain["integrator"], "or leave the constraints out",
             )  # fmt: skip
+        for part in self.interactions:
+            if part.reads_velocity is None:
+                part.reads_velocity = _names_velocity(type(part))
         self.implicit = [part for part in self.interactions if part.implicit]
         self.state.require({"position", "velocity"} | required)
         self.integrator = moves(
@@ -103,7 +107,7 @@ class Loop:
         if not self.implicit:
             return
         self.integrator.lead(dt)
-        now = self.state, self.neighbors, dt
+        now = self.state, self.integrator.damps
         for interaction in self.implicit if self.observers.all else ():  # who wants each part's own
             self.observers.act(interaction, FOLLOW, interaction.follow, *now)
         self.integrator.settle(dt)
@@ -209,6 +213,14 @@ class Loop:
 def _bound(parts: Sequence[Sequence[Any]]) -> list[Any]:
     """One part for all worlds, from the corresponding ones of the scenes."""
     return [peers[0].bind(peers) for peers in zip(*parts, strict=True)]
+
+
+def _names_velocity(kind: type) -> bool:
+    """Whether the source of a class speaks of velocities; of one that has none, it may."""
+    try:
+        return "velocity" in inspect.getsource(kind)
+    except (OSError, TypeError):
+        return True
 
 
 class Source(Protocol):

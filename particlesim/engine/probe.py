@@ -14,7 +14,7 @@ from .execution.acting import Attributes, act
 from .limit import Limit
 from .loop import Loop
 from .model import Model
-from .rates import Rates, turns
+from .rates import Rates, implicit_rates, turns
 from .spectrum import Largest, largest
 
 STEPS, LEAST = 30, 4  # applications of a Jacobian
@@ -152,8 +152,9 @@ class Probe:
         frequency = self._largest(parts, "position")
         damping = self._largest([each for each in parts if each.reads_velocity], "velocity")
         implicit = self._largest([each for each in parts if each.implicit], "velocity")
+        damped, turned = implicit_rates(implicit, self.loop.integrator.damps)
         rates = Rates(
-            min(frequency.bound, most[0]), min(damping.bound, most[1]), implicit.bound,
+            min(frequency.bound, most[0]), min(damping.bound, most[1]) + damped, turned,
             turn=turns(damping), turns=turns(implicit) > 0.0,
         )  # fmt: skip
         if rates.none:

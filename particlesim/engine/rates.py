@@ -82,3 +82,19 @@ def turns(found: Largest) -> float:
     values = found.values[np.abs(found.values) >= HEED * found.size]
     loose = np.abs(values.imag) > np.maximum(values.real, TURNING * found.size)
     return float(np.abs(values.imag)[loose].max(initial=0.0))
+
+
+def implicit_rates(found: Largest, damps: bool) -> tuple[float, float]:
+    """Of forces that are implicit: the damping that is explicit all the same, and the rest.
+
+    Args:
+        found: Their answer to velocities.
+        damps: Whether all of it is implicit, and not turning alone.
+    """
+    if damps or not len(found.values):
+        return 0.0, found.bound
+    turned = turns(found)
+    damped = float(np.abs(found.values.real).max())
+    if damped < TURNING * turned:
+        return 0.0, found.bound
+    return damped + found.residual, turned

@@ -20,8 +20,10 @@ FIELDS: dict[str, int | None] = {
     "inverse_mass": None,
     "radius": None,
     "force": 3,
-    "previous_force": 3,  # of the substep before, where velocities are predicted with it
+    "half_velocity": 3,  # of half a substep, where that of its end is predicted for the forces
+    "half_velocity_error": 3,
     "force_slope": 9,  # df/dv of the forces that are implicit in the velocity
+    "implicit_force": 3,  # their sum
     "velocity_lead": 3,  # how far ahead the velocity is that these are taken at
     "position_error": 3,  # what rounding has kept from x, compensated sums
     "velocity_error": 3,
@@ -128,7 +130,7 @@ class State:
 
     def clear_forces(self) -> None:
         """Set all forces, and how they answer to velocities, to zero where there are any."""
-        for name in ("force", "force_slope"):
+        for name in ("force", "force_slope", "implicit_force"):
             if name in self.arrays:
                 array = self.arrays[name]
                 launch(zero_kernel(array.dtype), self.count, [array], array.device)

@@ -157,10 +157,9 @@ class _Path:
             with np.errstate(all="ignore"):
                 self.budget -= 1.0
                 self.loop.substep(h)
-                if self.loop.neighbors.overflowing:
-                    self.loop.neighbors.lengthen()
+                if self.loop.neighbors.overflowing:  # rows are the run's own to lengthen
                     mark.restore()
-                    continue
+                    return 0.0, 0.0
                 self._settle()
                 stiffness = self._stiffness(*before)
             if not np.isfinite(stiffness):

@@ -107,6 +107,8 @@ class PairSum:
         self.kept = self._checked(earlier)
         self.names = (self.of_pair.quantities | self.last.quantities) - self.kept.keys()
         part.requires = part.requires | self.names
+        if "velocity" in self.names:
+            part.reads_velocity = True
         self.pairs = neighbors.of(part, self.names)
         cutoff = None if part.cutoff is None else np.array([each.cutoff for each in part.peers])
         columns = squared_distances(self.name, model, cutoff)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -34,8 +34,8 @@ class ParticleForce(Interaction):
     rises across the box, so that of a uniform force it is -f.x at the unwrapped position. It is
     conserved where the potential is a sum of one for each axis, or the same on opposite sides.
 
-    A force that depends on velocity is taken implicitly in it (see ``Integrator``), by its
-    derivative; of a law that Warp cannot derive, as one that loops, it is explicit.
+    A force that depends on velocity is implicit in it (see ``Integrator``) by its derivative; of a
+    law that Warp cannot derive, as one that loops, it is explicit.
 
     Args:
         law: Returns the force, ``wp.vec3``; None: it is derived from ``potential``. Its parameters
@@ -166,14 +166,16 @@ class ParticleForce(Interaction):
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         self._launch(self.kernel, state.force)
         if self.implicit:
-            self._launch(self._sloped(kernels.slope_kernel), state.force_slope)
+            kernel = kernels.slope_kernel(*self._called(0), self._by, *self._types)
+            self._launch(kernel, state.force_slope, state.implicit_force)
 
-    def follow(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        self._launch(self._sloped(kernels.follow_kernel), state.velocity_lead, state.force)
+    def follow(self, state: State, damps: bool) -> None:
+        kernel = kernels.follow_kernel(*self._called(0), self._by, damps, *self._types)
+        self._launch(kernel, state.velocity_lead, state.force)
 
-    def _sloped(self, kernel: Callable[..., wp.Kernel]) -> wp.Kernel:
-        by = self.arguments[0].names.index("velocity")
-        return kernel(*self._called(0), by, *self._types)
+    @property
+    def _by(self) -> int:
+        return self.arguments[0].names.index("velocity")
 
     def _launch(self, kernel: wp.Kernel, *arrays: wp.array) -> None:
         inputs = [self.members, self.world, self.params, self.data, *arrays]

@@ -37,6 +37,7 @@ class Springs(Interaction):
     """
 
     requires = frozenset({"force"})
+    reads_velocity = True  # whatever the damping of a world is: worlds go as they go alone
 
     def __init__(
         self, pairs: Any, stiffness: Any, rest_length: Any = None, damping: Any = 0.0
@@ -71,8 +72,7 @@ class Springs(Interaction):
             "damping": np.concatenate([peer.damping for peer in self.peers]),
         }
         model.fits(self.name, columns)
-        self.reads_velocity = bool(columns["damping"].any())
-        self.conservative = not self.reads_velocity
+        self.conservative = not columns["damping"].any()
         rows = topology.incidence(pairs)
         self.count = len(rows["particle"])
         if not self.count:

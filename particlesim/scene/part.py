@@ -117,8 +117,8 @@ class Interaction(Part):
     ``apply`` it adds to ``state.force``. ``state`` is the present one; ``neighbors`` holds the pair
     lists, up to date for it. ``parameters``, where there are any, is a dict of numbers and
     3-vectors that may differ from world to world. ``cutoff`` is the distance within which
-    neighbours are looked for; None: all pairs of a world. Where ``apply`` reads no velocities, say
-    ``reads_velocity = False``: velocity Verlet then need not predict them.
+    neighbours are looked for; None: all pairs of a world. ``reads_velocity`` says that ``apply``
+    reads velocities, which velocity Verlet then predicts; None: if the class's source names them.
 
     ``apply`` is recorded once and replayed in every substep: ``wp.launch``, ``wp.copy``, ``zero_``
     and ``fill_`` are, with the numbers and arrays that they are given then, and so is
@@ -155,18 +155,20 @@ class Interaction(Part):
 
     requires: frozenset[str] = frozenset({"force"})
     cutoff: float | None = None
-    reads_velocity: bool = True  # in any other way than that of ``follow``
+    reads_velocity: bool | None = None  # in any other way than that of ``follow``
     conservative: bool = False  # `measure` adds the potential of all that it does
-    implicit: bool = False  # adds df/dv of its force to ``state.force_slope``, and has ``follow``
+    # Adds its force to ``implicit_force`` too, df/dv to ``force_slope``, and has ``follow``.
+    implicit: bool = False
 
     def apply(self, state: Any, neighbors: Any, dt: float) -> None:
         """Add forces."""
         raise validate.undefined(self, "apply(self, state, neighbors, dt)")
 
-    def follow(self, state: Any, neighbors: Any, dt: float) -> None:
+    def follow(self, state: Any, damps: bool) -> None:
         """Add (df/dv) u, by which the force differs where the velocity is u ahead.
 
-        u is ``state.velocity_lead``; only of an ``implicit`` one.
+        u is ``state.velocity_lead``; unless ``damps``, of df/dv the antisymmetric part alone. Only
+        of an ``implicit`` one.
         """
 
     def measure(self, state: Any, energy: Any, virial: Any) -> None:

@@ -151,15 +151,11 @@ def test_drag():
     report = simulation(scene).stability()
     assert report.dt == pytest.approx(2 * 0.5 / 4.0, rel=0.01)
     assert report.binding.kind == "damping" and report.binding.particle == 0
-    # The kick takes v to (1 - z/2) / (1 + z/2) of it, z = gamma dt: from z = 2 on it is turned
-    # about, though at no step does it grow: 0.01 / 4 of the speed is left at 0.995 and 1.005.
-    for factor, sign in ((0.995, 1.0), (1.005, -1.0)):
-        sim = simulation(scene, dt=factor * 0.25, watchdog=False)
+    # v falls or grows by 1 - dt gamma a step: |v| = 3 * 1.01^300 = 59 against 3 * 0.99^300.
+    for factor, bounded in ((0.995, True), (1.005, False)):
+        sim = simulation(scene, dt=300 * factor * 0.25, substeps=300, watchdog=False)
         sim.step()
-        assert sim.velocity[0, 0] == pytest.approx(sign * 3 * 0.005 / 2, rel=0.01)
-    sim = simulation(scene, dt=1e3, substeps=10, watchdog=False)
-    sim.step()
-    assert abs(sim.velocity[0, 0]) < 3.0
+        assert (abs(sim.velocity[0, 0]) < 3.0) == bounded
 
 
 def test_quadratic_drag_at_the_present_speed():

@@ -162,6 +162,8 @@ def simulate(name, precision):
     sim.frames._record(sim.settings.substeps, peak)
     sample(sim)
     sim.project(1)
+    sim.loop.frame = 1
+    sim.rounds.make()
     for interaction in sim.interactions:
         if isinstance(interaction, ps.SPH):
             with np.errstate(invalid="ignore"):  # densities were not computed
