@@ -12,7 +12,7 @@ ground up, each of which knows only those below it:
     output          files: recordings, USD and its tools, histories, surfaces, checkpoints
     pictures        stills, films and the live view
     simulation      Simulation: a face over all of these, and running with a recording
-    accuracy        speed against accuracy: trade-offs, tuning, stress
+    accuracy        speed against accuracy: trade-offs, tuning, measured numbers, stress
     commands        the command line
 
 Public names are listed in ``__init__.pyi`` and loaded when first used.

@@ -200,7 +200,11 @@ class Reading(Access):
         return notebook_picture(self)
 
     def stability(self) -> Stability:
-        """The largest safe substep of every part at the present moment, and what binds."""
+        """The largest safe substep of every part, now and on the path ahead, and what binds.
+
+        The simulation goes on for some hundred steps of its own and is put back as it was; see
+        :mod:`particlesim.instruments.foresight`. Of large scenes only the present is looked at.
+        """
         return stability(self.loop)
 
     def diagnostics(self) -> Diagnostics:
