@@ -32,8 +32,9 @@ LOOK = 8  # applications of a Jacobian where the limits are asked on the way
 FEW = 12  # evaluations: with fewer there is no path
 PHASE = 0.5  # omega h of a step on the path
 TOO_FAR = 0.8  # of it: what is taken back, too
+QUIET = 40  # steps on which no force changes, each twice as long as the last: nothing comes
 TRIES = 12  # of a step that goes too far
-SINGULAR = 1e12  # times the median stiffness of the way
+SINGULAR = 1e-9  # of the longest step before it
 GROWN = 1.2  # times what was met before: the limits are asked again
 ASKED = 40  # times, at most
 FAINT = 0.1  # of the rms displacement: what moves less says nothing about stiffness
@@ -94,14 +95,14 @@ class _Path:
         self.crossing = _tightest([each for each in limits if each.part in names])
         self.found: Limit | None = None  # the tightest on the way
         self.when = 0.0
-        self.trail: list[float] = []  # how stiff it was, step by step
+        self.trail: list[float] = []  # its steps
         self.asked, self.met = 0, np.zeros(3)
         self.moves = loop.model.column("pinned") == 0
         self.mass = loop.model.column("mass")
         self.energies = _Energies(loop, self.mass * self.moves)
 
     def walk(self, steps: int) -> Ahead:
-        loop, t = self.loop, 0.0
+        loop, t, quiet = self.loop, 0.0, 0
         self._settle()
         self.met = self._sizes(0.0)
         mark, h = Snapshot(loop), self._start()
@@ -114,7 +115,10 @@ class _Path:
             if not h > 0.0:
                 break
             t += h
-            self.trail.append(stiffness)
+            quiet = 0 if stiffness > 0 else quiet + 1
+            if quiet > QUIET:
+                break
+            self.trail.append(h)
             self.energies.note(h, self.v, before[2], self.a)
             sizes = self._sizes(stiffness)
             if (sizes > GROWN * self.met).any() and self.asked < ASKED and self.budget > 2 * LOOK:
@@ -127,9 +131,11 @@ class _Path:
         return Ahead(self._told(), self.energies.step(loop.integrator.order))
 
     def _singular(self) -> bool:
-        """Whether it was stiffer than on most of the way by more than any orbit could be."""
-        trail = np.array(self.trail)
-        return len(trail) >= FEW and bool(trail.max() > SINGULAR * np.median(trail))
+        """Whether steps have shrunk, from the longest before, by more than any orbit asks for."""
+        if not self.trail:
+            return False
+        steps = np.array(self.trail)
+        return bool((steps < SINGULAR * np.maximum.accumulate(steps)).any())
 
     def _told(self) -> Limit | None:
         found = self.found

@@ -91,6 +91,7 @@ PROVISIONAL = 1.0 / 60.0  # a frame's time while it is yet to be found
 MANY = 10.0  # times the speed that anything has, or gains in a frame
 FEW = 1e-4  # of the size of the scene: what rounding and stretched springs may be off
 GLANCE = 0.4  # of the path ahead: what a run looks at before it begins
+DEAREST = 0.02  # of the limit: what an energy may ask for, at most
 SAFETY = 0.5  # of the limit, at most, where the settings leave it open
 NEGLIGIBLE = 0.97  # of the tightest limit: what several parts do together matters below it
 
@@ -211,7 +212,8 @@ def _chosen(loop: Loop, safety: float | None) -> float:
     largest = min((each.dt for each in limits), default=math.inf)
     if safety is not None:
         return safety * largest
-    return min(SAFETY * largest, ahead.energy_step) if largest < math.inf else math.inf
+    wanted = max(ahead.energy_step, DEAREST * largest)
+    return min(SAFETY * largest, wanted) if largest < math.inf else math.inf
 
 
 def misfit(loop: Loop) -> str:

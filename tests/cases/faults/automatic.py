@@ -47,7 +47,7 @@ SCENES = {
     "atoms at rest at 1.3": (partial(atoms, 1.3), trend_kept(least=1.0), 300),
     "atoms that meet at 30": (partial(atoms, 3.9, 30.0), trend_kept(), 100),
     "Morse, at rest at 1.8": (partial(couple, laws.morse, 1.8, **WELL), trend_kept(least=1.0), 300),
-    "attracting Yukawa": (partial(couple, laws.yukawa, 3.0, across=0.02, **PULL),
+    "attracting Yukawa": (partial(couple, laws.yukawa, 3.0, across=0.3, **PULL),
         trend_kept(least=1.0), 300),
     "quartic trap from 5": (partial(trapped, laws.quartic, (5, 0, 0), strength=1.0), trend_kept(),
         300),
