@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .integrators import Integrator
 
 TURNING = 0.1  # of the largest rate: a smaller imaginary part is rounding
+GROWTH = 20.0  # what pushes along the velocity counts for as much damping: (1 + z)^n is e^(n z)
 HEED = 0.5  # of the largest rate: what is smaller is not resolved well enough
 
 
@@ -97,4 +98,7 @@ def implicit_rates(found: Largest, damps: bool) -> tuple[float, float]:
     damped = float(np.abs(found.values.real).max())
     if damped < TURNING * turned:
         return 0.0, found.bound
+    grows = -float(found.values.real.min())
+    if grows > TURNING * found.size:
+        damped = max(damped, GROWTH * grows)
     return damped + found.residual, turned

@@ -161,6 +161,9 @@ def warn_if_past(loop: Loop, again: bool = False) -> None:
     report = Stability(_in_order(_limits_now(loop, quick=True)), loop.settings)
     if not report.safe or not again:
         report = stability(loop, GLANCE)
+    if again:  # what slow collisions gain is told by the energy, and is no danger
+        limits = [each for each in report.limits if each.kind != "collision"]
+        report = Stability(limits, loop.settings)
     if report.safe or report.binding is None:
         return
     _warned.add(loop)

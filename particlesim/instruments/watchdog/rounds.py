@@ -1,7 +1,7 @@
 """Rounds: what the watchdog looks at only now and then, and tells once of each world.
 
-- Energy, where every force has a potential and nothing else acts: it may differ by ``DRIFT`` of the
-  largest kinetic energy so far.
+- Energy, where every force has a potential and nothing else acts: it may differ by ``DRIFT`` of
+  itself at the start, or of the largest kinetic energy that a round has seen.
 - Constraints: how far the particles of a tuple are off, |C + alpha F| / |grad C|, in
   parts of how far they are apart; how deep grains are in each other and in boundaries, in parts of
   their radius.
@@ -104,13 +104,13 @@ class Rounds:
         self.start[fresh] = energy[fresh]
         self.fastest[fresh] = 0.0
         self.fastest = np.fmax(self.fastest, now.kinetic)
-        drift = np.abs(energy - self.start) / self.fastest
+        drift = np.abs(energy - self.start) / np.fmax(self.fastest, np.abs(self.start))
         off = drift > DRIFT
         for w in np.nonzero(off & self.off)[0].tolist():
             self._tell(
                 "energy", w,
-                f"energy must stay within {DRIFT:.0%} of the largest kinetic energy, as all forces "
-                f"have potentials, got {energy[w]:.6g} after {self.start[w]:.6g}, off by "
+                f"energy must stay within {DRIFT:.0%} of itself or the largest kinetic energy, as all "
+                f"forces have potentials, got {energy[w]:.6g} after {self.start[w]:.6g}, off by "
                 f"{drift[w]:.2g} of it",
                 f"use more substeps than {self.loop.settings.substeps}"
                 + ("" if self.loop.integrator.order > 1 else ", or integrator='velocity_verlet'"),
