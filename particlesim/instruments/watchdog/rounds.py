@@ -109,9 +109,9 @@ class Rounds:
         for w in np.nonzero(off & self.off)[0].tolist():
             self._tell(
                 "energy", w,
-                f"energy must stay within {DRIFT:.0%} of itself or the largest kinetic energy, as all "
-                f"forces have potentials, got {energy[w]:.6g} after {self.start[w]:.6g}, off by "
-                f"{drift[w]:.2g} of it",
+                f"energy must stay within {DRIFT:.0%} of itself or the largest kinetic energy, as "
+                f"all forces have potentials, got {energy[w]:.6g} after {self.start[w]:.6g}, off "
+                f"by {drift[w]:.2g} of it",
                 f"use more substeps than {self.loop.settings.substeps}"
                 + ("" if self.loop.integrator.order > 1 else ", or integrator='velocity_verlet'"),
             )  # fmt: skip
