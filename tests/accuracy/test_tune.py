@@ -217,7 +217,9 @@ def test_an_answer_that_fails_elsewhere():
 # In a time --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("arguments", [{"by": off_harmonic}, {}])
+@pytest.mark.parametrize(
+    "arguments", [{"by": off_harmonic}, pytest.param({}, marks=pytest.mark.slow)]
+)
 def test_the_best_that_a_time_buys(arguments):
     found = ps.tune(
         harmonic, budget="20 ms", frames=24, settings=two_turns(), device="cpu", **arguments

@@ -108,7 +108,9 @@ def check(name, apart=1.5):
     return largest[mine] / tolerance, ratio
 
 
-@pytest.mark.parametrize("name", ["triple_pendulum", "three_body"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("triple_pendulum", marks=pytest.mark.slow), "three_body"]
+)
 def test_tunes_a_ready_scene(name):
     error, cost = check(name, 4.0)
     assert error <= 1.0
