@@ -4,7 +4,7 @@ import functools
 
 import warp as wp
 
-from ..precision import register
+from ..precision import function, register
 from .constraints import Solved, view_function
 
 
@@ -89,6 +89,21 @@ def measure_kernel(law: Solved) -> wp.Kernel:
     return constraint_measure
 
 
+def counted_function(law: Solved) -> wp.Function:
+    """``counted(C, r, t)``: C of tuple r; of an inequality what is below 0, of a broken one 0."""
+    real, _, Tuples, _ = law.types
+
+    def counted(C: real, r: int, t: Tuples):
+        if t.one_sided != 0:
+            C = wp.min(C, real(0.0))
+        if t.breakable != 0:
+            if t.broken[r] != 0:
+                C = real(0.0)
+        return C
+
+    return function(counted)
+
+
 @functools.cache
 def virial_kernel(law: Solved) -> wp.Kernel:
     """Kernel: virial F sum_a grad_a C . x_a of multipliers, F = lam / dt^2, and the energy of
@@ -98,7 +113,7 @@ def virial_kernel(law: Solved) -> wp.Kernel:
     a stiff tuple is off by for want of iterations is no energy that it holds.
     """
     real, Box, Tuples, Bodies = law.types
-    size, view = law.size, view_function(law)
+    size, view, counted = law.size, view_function(law), counted_function(law)
 
     @register
     def constraint_virial(
@@ -117,11 +132,7 @@ def virial_kernel(law: Solved) -> wp.Kernel:
             r = seats.tuple[n]
             a = seats.seat[n]
             _x, _e, X, C, G = view(r, box, t, b)
-            if t.one_sided != 0:
-                C = wp.min(C, real(0.0))
-            if t.breakable != 0:
-                if t.broken[r] != 0:
-                    C = real(0.0)
+            C = counted(C, r, t)
             alpha = wp.float64(t.item[r].compliance)
             F = wp.float64(t.lam[r]) * scale[0] * wp.float64(b.unit)
             if alpha > wp.float64(0.0) and C != real(0.0):

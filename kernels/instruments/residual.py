@@ -5,6 +5,7 @@ import functools
 import warp as wp
 
 from ..constraints.boundary import Form, held_type, meeting_function
+from ..constraints.constraint_force import counted_function
 from ..constraints.constraints import Solved, bodies_type, rounding_function, view_function
 from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
 from ..precision import Precision, register
@@ -14,7 +15,7 @@ from ..precision import Precision, register
 def tuples_kernel(law: Solved) -> wp.Kernel:
     """Kernel: C of each tuple; of an inequality what is below 0, of a broken one nothing."""
     real, Box, Tuples, Bodies = law.types
-    view = view_function(law)
+    view, counted = view_function(law), counted_function(law)
 
     @register
     def miss_tuples(
@@ -26,12 +27,7 @@ def tuples_kernel(law: Solved) -> wp.Kernel:
     ):
         r = first + wp.tid()
         _x, _e, _X, C, _G = view(r, box, t, b)
-        if t.one_sided != 0:
-            C = wp.min(C, real(0.0))
-        if t.breakable != 0:
-            if t.broken[r] != 0:
-                C = real(0.0)
-        miss_out[r] = C
+        miss_out[r] = counted(C, r, t)
 
     return miss_tuples
 

@@ -21,7 +21,8 @@ from .observers import Observer
 # Made anew in every substep, or never changed: nothing to keep.
 TRANSIENT = frozenset(
     {"mass", "inverse_mass", "radius", "world", "correction", "previous_position", "density",
-     "pressure"}
+     "pressure", "force_slope", "implicit_force", "velocity_lead", "half_velocity",
+     "half_velocity_error"}
 )  # fmt: skip
 Rows = dict[str, tuple[np.ndarray, np.ndarray]]  # by array: which rows, and what is in them
 

@@ -21,7 +21,7 @@ from ..engine.report import Report, grid
 from ..interactions.fusion import fuse
 from ..scene.scene import Scene
 from ..scene.settings import AUTO, Settings
-from .foresight import look_ahead
+from .foresight import Ahead, look_ahead
 from .residuals import UNMET, off
 
 
@@ -108,10 +108,14 @@ def stability(loop: Loop, share: float = 1.0) -> Stability:
 
     ``share``: of that path, how far to look.
     """
+    return Stability(_in_order(_foreseen(loop, share)[0]), loop.settings)
+
+
+def _foreseen(loop: Loop, share: float = 1.0) -> tuple[list[Limit], Ahead]:
+    """The limits now and ahead, and what else there is on that path."""
     limits = _limits_now(loop)
-    ahead = look_ahead(loop, limits, share).limit
-    limits += [] if ahead is None else [ahead]
-    return Stability(_in_order(limits), loop.settings)
+    ahead = look_ahead(loop, limits, share)
+    return limits + ([] if ahead.limit is None else [ahead.limit]), ahead
 
 
 def _in_order(limits: list[Limit]) -> list[Limit]:
@@ -207,11 +211,9 @@ def _chosen(loop: Loop, safety: float | None) -> float:
 
     Not a number where the path ahead is singular.
     """
-    limits = _limits_now(loop)
-    ahead = look_ahead(loop, limits)
+    limits, ahead = _foreseen(loop)
     if ahead.singular:
         return math.nan
-    limits += [] if ahead.limit is None else [ahead.limit]
     largest = min((each.dt for each in limits), default=math.inf)
     if safety is not None:
         return safety * largest
