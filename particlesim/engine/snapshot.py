@@ -58,10 +58,14 @@ class Snapshot:
             launch(copy_kernel(array.dtype), len(array), inputs, array.device)
 
     def restore(self) -> None:
-        """Go back; neighbour rows are made again from the positions that they were made from."""
+        """Go back; neighbour rows are made again from the positions that they were made from.
+
+        That a row was full since is undone with the rest.
+        """
         for name, array in self.arrays.items():
             wp.copy(array, self.copies[name])
         for each in self.loop.neighbors.verlet:
+            each.overflow.zero_()
             each.mark_all()
             each.rebuild()
 
