@@ -11,10 +11,11 @@ import numpy as np
 from .. import validate
 from ..scene.settings import Settings
 from .judges import Judge
-from .observe import WORDS, Apart, Observable, Series, World, observable
+from .observables import Observable, observable
 from .reference import Reference
 from .refining import SHARE, Refining
 from .run import Run
+from .series import WORDS, Apart, Series, World
 from .study import KNOBS, Plan, Study, options_of
 
 RUNS = 8  # of the reference, at most: to about 2^7 of the finest substeps that are judged

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from .observe import WORDS
 from .one_world import worlds_of
 from .run import Run
+from .series import WORDS
 
 
 class Judge:

@@ -12,9 +12,9 @@ from ..instruments.watchdog.incident import SimulationWarning
 from ..scene.settings import Settings
 from .converged import Converged
 from .judges import EnergyDrift, Judge, Known, MomentumDrift
-from .observe import OVER
 from .reference import Reference
 from .run import LEAST, Run
+from .series import OVER
 from .study import Plan, Study
 
 ERRORS = ("known", "converged", "energy", "momentum")

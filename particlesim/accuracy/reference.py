@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .observe import Apart, Observable, World, apart, moving, scale_of, shortest, step_between
+from .observables import Observable
+from .series import Apart, World, apart, moving, scale_of, shortest, step_between
 
 Seen = list[list[np.ndarray]]  # values by observable and world, each (times + 1, ...)
 

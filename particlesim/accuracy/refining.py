@@ -17,8 +17,9 @@ import numpy as np
 from .. import validate
 from ..instruments.watchdog.incident import SimulationError, SimulationWarning
 from ..simulation.simulation import Simulation
-from .observe import Observable, Series, World
+from .observables import Observable
 from .reference import Reference
+from .series import Series, World
 from .study import Plan, Study
 
 PATIENCE = 3  # changes before it counts that they do not fall; one less where they are large

@@ -167,7 +167,8 @@ def stress(
 
 def _observed(owner: str, module: ModuleType, name: str | None, over: str | None) -> Any:
     """What --observe names: of the module, if it has such a function, or ready."""
-    from ..accuracy.observe import OVER, READY
+    from ..accuracy.observables import READY
+    from ..accuracy.series import OVER
 
     if over is not None:
         validate.choice(owner, "--over", over, OVER)

@@ -16,8 +16,8 @@ def measure(
     observe: Annotated[
         str,
         typer.Option(
-            help="energy, kinetic, potential, momentum, temperature, pressure, a function of the "
-            "scene's module, MODULE:FUNCTION or FILE.py:FUNCTION."
+            help="energy, kinetic, potential, momentum, angular_momentum, virial, temperature, "
+            "pressure, a function of the scene's module, MODULE:FUNCTION or FILE.py:FUNCTION."
         ),
     ],
     error: Annotated[float, typer.Option(help="Half the width of the interval, at most.")] = 1e-3,

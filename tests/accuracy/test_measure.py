@@ -9,7 +9,7 @@ import particlesim as ps
 from cases.measured import aside, plucked, spring, string
 from cases.measured_many import gas, gases, jets
 from particlesim.accuracy.measure import over
-from particlesim.accuracy.measure.observables import READY
+from particlesim.accuracy.observables import sizes
 
 VERLET = "velocity_verlet"
 
@@ -195,7 +195,7 @@ def test_ready_observables():
         "momentum": np.linalg.norm(now.momentum, axis=1), "temperature": now.kinetic / 45,
         "pressure": now.kinetic / 12,
     }.items():  # fmt: skip
-        np.testing.assert_allclose(READY[name](sim), truth, rtol=1e-12)
+        np.testing.assert_allclose(sizes("measure", name)(sim), truth, rtol=1e-12)
 
 
 def test_arguments_that_do_not_fit_are_refused(refused):
@@ -203,7 +203,7 @@ def test_arguments_that_do_not_fit_are_refused(refused):
         measure(observe="enrgy")
     with refused("observe must return a number"):
         measure(observe=lambda sim: sim.position)
-    with refused("observe must be of a scene that is periodic"):
+    with refused("pressure must be of a scene that is periodic on all axes"):
         measure(observe="pressure")
     with refused("over must be one of final"):
         measure(over="median")

@@ -8,7 +8,7 @@ import warp as wp
 
 import particlesim as ps
 from cases.closed_forms import EXACT, along, harmonic, off_harmonic, two_turns
-from particlesim.accuracy.observe import READY
+from particlesim.accuracy.observables import READY
 
 FRAMES = 24
 STEPS = [2, 4, 8, 16]

@@ -7,7 +7,7 @@ import pytest
 
 import particlesim as ps
 from cases.closed_forms import along, harmonic, off_harmonic, two_turns
-from particlesim.accuracy.observe import observable
+from particlesim.accuracy.observables import observable
 from particlesim.accuracy.refining import settled
 from particlesim.accuracy.study import Study
 from particlesim.accuracy.tune.bench import Bench

@@ -6,7 +6,7 @@ import math
 import pytest
 
 import particlesim as ps
-from particlesim.accuracy.observe import observable
+from particlesim.accuracy.observables import observable
 from particlesim.accuracy.refining import settled
 from particlesim.accuracy.study import Study
 

@@ -15,8 +15,7 @@ from ...simulation.simulation import Simulation
 from .. import statistics
 from ..study import SEED, Plan, Study
 from ..table import assignments
-from .observables import OWNER, read
-from .over import Reduction, final, mean
+from .over import OWNER, Reduction, final, mean
 
 WORLDS = 64  # of one batch, at most
 DRIFT = 0.99  # confidence with which the halves of a steady state must differ, to be none
@@ -155,3 +154,15 @@ class Bench:
                 OWNER, "budget", f"suffice for {part}", f"{self.budget:g} s",
                 "give more, or allow a larger error",
             )  # fmt: skip
+
+
+def read(observe: Callable[[Any], Any], sim: Any) -> np.ndarray:
+    """What is observed now: a number of the simulation, (), or one a world, (worlds,)."""
+    with np.errstate(all="ignore"):
+        value = np.asarray(observe(sim), dtype=np.float64)
+    if value.shape not in ((), (sim.world_count,)):
+        raise validate.fail(
+            OWNER, "observe", "return a number, or one a world", f"an array of {value.shape}",
+            "have it return a float",
+        )  # fmt: skip
+    return value

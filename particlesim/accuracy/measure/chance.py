@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from ... import validate
 from ..statistics import Mean, student
 from .levels import FACTORS, PILOT, SAMPLES, Level, agree, corrected, enlarged
-from .observables import OWNER
+from .over import OWNER
 from .richardson import LEAST
 
 HALF = 0.5  # of a correction is made, as averages may converge at a higher order than positions

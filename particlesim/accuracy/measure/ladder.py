@@ -12,7 +12,7 @@ from ... import validate
 from ...instruments.watchdog.incident import SimulationError
 from ..statistics import Mean, independent, student
 from .levels import FACTORS, PILOT, SAMPLES, Level, agree, certain, corrected, enlarged
-from .observables import OWNER
+from .over import OWNER
 from .richardson import ROUNDING, Limit, limit
 
 RUNGS = 12  # at most

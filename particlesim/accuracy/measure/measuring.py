@@ -9,12 +9,12 @@ from typing import Any
 
 from ... import validate
 from ...scene.settings import Settings
+from ..observables import sizes
 from ..statistics import Mean
 from ..study import SEED, Study, options_of
 from .aim import Aim
 from .bench import Bench
-from .observables import OWNER, observable
-from .over import reduction
+from .over import OWNER, reduction
 from .report import Measured, Part
 from .rounding import round_off
 from .spatial import in_space
@@ -52,8 +52,8 @@ def measure(
         build: ``build(**options) -> Scene``. Of a scene module, that module's ``settings`` and
             ``frames`` hold where None is given.
         observe: A function of the simulation: a number, or one a world, (worlds,), with which seeds
-            run as one batch. Or a name: ``"energy"``, ``"kinetic"``, ``"potential"``,
-            ``"momentum"`` (its size), ``"temperature"`` (k T), ``"pressure"``.
+            run as one batch. Or ``"energy"``, ``"kinetic"``, ``"potential"``, ``"virial"``,
+            ``"temperature"`` (k T), ``"pressure"``, ``"momentum"``, ``"angular_momentum"`` (sizes).
         error: Half the width of the interval, at most [unit of what is observed].
         confidence: With which the interval is to hold the true value.
         over: ``"final"``, at the end; ``"max"`` or ``"rms"``, of start and frames; ``"period"``, of
@@ -83,7 +83,7 @@ def measure(
     study = Study(OWNER, build, settings, options, frames, device)
     resolution = _resolution(study, space)
     tell = progress if callable(progress) else _print if progress else _nothing
-    bench = Bench(study, observable(observe), reduction(over), _seed(study), budget, tell)
+    bench = Bench(study, sizes(OWNER, observe), reduction(over), _seed(study), budget, tell)
     return _measured(Aim(bench, error, confidence), resolution, f"{_name(observe)}, {_name(over)}")
 
 

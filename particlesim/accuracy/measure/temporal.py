@@ -15,8 +15,7 @@ from .aim import Aim
 from .chance import Averages
 from .ladder import Ladder
 from .levels import Level, Series, needed
-from .observables import OWNER
-from .over import period
+from .over import OWNER, period
 from .richardson import Limit
 
 PLAIN = 0.9  # of the error, for the step of a plain run where there is nothing else

@@ -23,9 +23,10 @@ from ... import validate
 from ...scene.settings import Settings
 from ..converged import times_of
 from ..judging import which_error
-from ..observe import OVER, observable
+from ..observables import observable
 from ..reference import Reference
 from ..refining import settled
+from ..series import OVER
 from ..study import Study
 from .along import Along
 from .bench import Bench

@@ -1,16 +1,15 @@
-"""Observables: what is looked at of a simulation, and how far two runs of it are apart in that."""
+"""Series of what is observed over time, and how far two of them are apart."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from .. import validate
-from .one_world import worlds_of
+from .observables import Observable
 from .statistics import mean
 
 OVER = ("final", "max", "rms", "mean")
@@ -20,80 +19,6 @@ WORDS = {
     "rms": "root mean square over all frames",
     "mean": "of the average over all frames",
 }
-
-
-def _temperature(sim: Any) -> float:
-    """k T = 2 K / (3 n), n the particles that are not pinned [energy]."""
-    free = int(np.count_nonzero(~np.asarray(sim.scenes[0].pinned, dtype=bool)))
-    return 2.0 * float(sim.diagnostics().kinetic[0]) / (3.0 * max(free, 1))
-
-
-def _pressure(sim: Any) -> float:
-    """P = (2 K + sum r.F) / (3 V) in a periodic box (Clausius 1870)."""
-    box = sim.scenes[0].periodic
-    if box is None or not all(box[2]):
-        raise validate.fail(
-            "observe", "pressure", "be of a scene that is periodic on all axes", box,
-            "give a function of the simulation",
-        )  # fmt: skip
-    now = sim.diagnostics()
-    volume = float(np.prod(np.asarray(box[1]) - np.asarray(box[0])))
-    return (2.0 * float(now.kinetic[0]) + float(now.virial[0])) / (3.0 * volume)
-
-
-READY: dict[str, Callable[[Any], Any]] = {
-    "position": lambda sim: sim.position,
-    "velocity": lambda sim: sim.velocity,
-    "momentum": lambda sim: sim.diagnostics().momentum[0],
-    "angular_momentum": lambda sim: sim.diagnostics().angular_momentum[0],
-    "kinetic": lambda sim: sim.diagnostics().kinetic[0],
-    "potential": lambda sim: sim.diagnostics().potential[0],
-    "energy": lambda sim: sim.diagnostics().energy[0],
-    "virial": lambda sim: sim.diagnostics().virial[0],
-    "temperature": _temperature,
-    "pressure": _pressure,
-}
-PARTICLES = ("position", "velocity")  # one vector for each
-
-
-@dataclass(frozen=True)
-class Observable:
-    """Something to look at.
-
-    Args:
-        name: As the words of reports have it.
-        function: Of a simulation of one world; gives a number, or an array of any shape.
-        particles: Whether it gives a vector for each particle.
-        wrapped: Whether differences go the short way round a periodic box.
-    """
-
-    name: str
-    function: Callable[[Any], Any]
-    particles: bool = False
-    wrapped: bool = False
-
-    def __call__(self, sim: Any) -> list[np.ndarray]:
-        """The values of every world, each an array of its own."""
-        return [np.array(self.function(each)) for each in worlds_of(sim)]
-
-
-def observable(owner: str, observe: Any) -> Observable:
-    """A ready observable by its name, or one of a function of the simulation.
-
-    Raises:
-        ValueError: No such name. TypeError: Neither a name nor a function.
-    """
-    if isinstance(observe, str):
-        validate.choice(owner, "observe", observe, READY)
-        particles = observe in PARTICLES
-        return Observable(observe, READY[observe], particles, wrapped=observe == "position")
-    if not callable(observe):
-        raise TypeError(
-            f"{owner}: observe must be a function of the simulation or one of {', '.join(READY)}, "
-            f"got {observe!r}; pass lambda sim: ..."
-        )
-    name = getattr(observe, "__name__", "")
-    return Observable("values" if name in ("", "<lambda>") else name, observe)
 
 
 class Series:
