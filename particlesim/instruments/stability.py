@@ -91,7 +91,7 @@ PROVISIONAL = 1.0 / 60.0  # a frame's time while it is yet to be found
 MANY = 10.0  # times the speed that anything has, or gains in a frame
 FEW = 1e-4  # of the size of the scene: what rounding and stretched springs may be off
 GLANCE = 0.4  # of the path ahead: what a run looks at before it begins
-DEAREST = 0.02  # of the limit: what an energy may ask for, at most
+DEAREST = 0.0015  # of the limit: what an energy may ask for, at most; such a one is all but zero
 SAFETY = 0.5  # of the limit, at most, where the settings leave it open
 NEGLIGIBLE = 0.97  # of the tightest limit: what several parts do together matters below it
 
