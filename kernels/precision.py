@@ -236,12 +236,14 @@ KERNELS: list[wp.Kernel] = []  # every kernel built in this process that CUDA ca
 kernel = functools.partial(wp.kernel, enable_backward=False, module="unique")
 
 
-def register(func: Callable[..., Any], cpu_only: bool = False) -> wp.Kernel:
+def register(func: Callable[..., Any], cpu_only: bool = False, flags: str = "") -> wp.Kernel:
     """Make a kernel without a backward pass, in a module of its own, and remember it.
 
     ``cpu_only`` ones hold C++ for the CPU's vector units or threads; CUDA never runs them.
+    ``flags`` are for the CPU's compiler, beside those of all kernels.
     """
-    made = kernel(func)
+    options = {"cpu_compiler_flags": f"{wp.config.cpu_compiler_flags} {flags}"} if flags else None
+    made = kernel(func, module_options=options)
     if not cpu_only:
         KERNELS.append(made)
     return made

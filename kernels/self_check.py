@@ -1,9 +1,8 @@
 """The fast ways on a CPU, tried once a process against Warp's own before they are trusted.
 
 Native loops and packed launches rest on Warp's insides (:mod:`particlesim.kernels.warp_internals`),
-which another Warp may have changed. Two particles find each other through a hash grid, and a law
-and its derivative are summed over their rows: natively and packed, and by Warp's own loops and
-launch.
+which another Warp may have changed. Two particles find each other, and a law and its derivative are
+summed over their row: natively and packed, and by Warp's own loop and launch.
 """
 
 import functools
@@ -13,10 +12,14 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from .engine.loops import ROWS, Pairs, Periodicity, box_type, native_loop, plain_loop
-from .engine.neighbors import cells_type
-from .engine.rows import BLOCK, SPARE, row_functions
-from .precision import FLOAT64, function, register, structure, translate
+from .engine.clusters import SUPER, halving_kernels, supers_type
+from .engine.columns import columns_type
+from .engine.loops import ROWS, Pairs, Periodicity, Term, box_type
+from .engine.neighbors import blocks_type
+from .engine.packed import AHEAD
+from .engine.partners import Attic, partners_kernel
+from .interactions.pair import pair_kernel
+from .precision import FLOAT64, function, structure, translate
 from .warp_internals import WRITTEN_FOR, Packed
 from .warp_watch import watched
 
@@ -51,62 +54,84 @@ def _attraction(r2: float, strength: float):
     return strength / (1.5 + r2)
 
 
+X = np.array([(0.5, 0.5, 0.5), (1.25, 0.5, 0.5)])  # two particles
+
+
 @functools.cache
-def _kernel(vectorised: bool) -> wp.Kernel:
-    """Kernel: make a row by grid, and sum the law and its slope over it."""
-    real, Box, Cells = FLOAT64.scalar, box_type(FLOAT64), cells_type(FLOAT64)
-    Data = structure("CheckData", {"x": wp.array(dtype=VEC3)})
+def _kernel(vectorised: bool) -> tuple[wp.Kernel, Any, Any, Any]:
+    """Kernel: sum the law and its slope over a row; with its structs."""
+    real = FLOAT64.scalar
+    Data = structure("CheckData", {"x": wp.array(dtype=VEC3), "slot": wp.array(dtype=wp.int32)})
     Params = structure("CheckParameters", {"cutoff_squared": real, "strength": real})
+    Out = structure("CheckSums", {"sum": wp.array(dtype=PAIR)})
     law = translate(_attraction, FLOAT64)
 
     def law_and_slope(i: int, j: int, x_ij: VEC3, r2: real, d: Data, p: Params):
         slope, _unused = wp.grad(law)(r2, p.strength)
         return PAIR(law(r2, p.strength), slope)
 
-    make = native_loop if vectorised else plain_loop
-    loop = make(function(law_and_slope), Data, Params, 2, FLOAT64, OPEN, ROWS)
-    _of_range, of_cells = row_functions(FLOAT64, OPEN, vectorised)
+    def keep(i: int, particle: int, total: PAIR, d: Data, p: Params, o: Out):
+        o.sum[i] = total
 
-    @functools.partial(register, cpu_only=True)
-    def check(
-        first: int,
-        grid: wp.uint64,
-        slot: wp.array(dtype=wp.int32),
-        planes: wp.array2d(dtype=real),
-        x: wp.array(dtype=VEC3),
-        pairs: Pairs,
-        sums_out: wp.array(dtype=PAIR),
-    ):
-        i = first + wp.tid()
-        one = real(1.0)
-        pairs.count[i] = of_cells(
-            i, 0, grid, x[i], one, Cells(), slot, SPARE, pairs, Box(), planes, one
-        )
-        d = Data()
-        d.x = x
-        p = Params()
-        p.cutoff_squared = real(1.0)
-        p.strength = real(3.0)
-        sums_out[i] = loop(i, pairs, Box(), d, p)
-
-    return check
+    types = (Data, Params, Out)
+    term = Term(function(law_and_slope), 2)
+    kernel = pair_kernel(term, function(keep), *types, FLOAT64, OPEN, ROWS, vectorised)
+    return kernel, *types
 
 
 def _sums(vectorised: bool) -> np.ndarray:
     """The law and its slope for each of two particles, (2, 2); NaN where nothing was written."""
-    host = np.array([(0.5, 0.5, 0.5), (1.25, 0.5, 0.5)])  # in cells of their own
     with wp.ScopedDevice("cpu"):
-        x = wp.array(host, dtype=VEC3)
-        planes = wp.array(np.pad(host.T, ((0, 0), (0, BLOCK))), dtype=FLOAT64.scalar)
-        grid = wp.HashGrid(4, 4, 4, dtype=FLOAT64.scalar)
-        grid.build(x, 1.0)
-        pairs = Pairs()
-        pairs.count, pairs.index = wp.zeros(2, dtype=int), wp.zeros(4 * SPARE, dtype=int)
-        pairs.row, pairs.entry_stride = wp.array([0, 2 * SPARE], dtype=wp.int64), 1
-        sums = wp.full(2, value=PAIR(np.nan), dtype=PAIR)
-        slot = wp.array([0, 1], dtype=int)
-        inputs: list[Any] = [0, grid.id, slot, planes, x, pairs, sums]
-        command = wp.launch(_kernel(vectorised), 2, inputs, record_cmd=vectorised)
+        pairs, box = _found() if vectorised else _given(), wp.zeros(1, dtype=box_type(FLOAT64))
+        kernel, Data, Params, Out = _kernel(vectorised)
+        p, d, o = Params(), Data(), Out()
+        p.cutoff_squared, p.strength = 1.0, 3.0
+        d.x, d.slot = wp.array(np.pad(X, ((0, 1), (0, 0))), dtype=VEC3), _whole([0, 1])
+        o.sum = wp.full(2, value=PAIR(np.nan), dtype=PAIR)
+        inputs: list[Any] = [0, pairs, box, wp.array([p], dtype=Params), d, o]
+        command = wp.launch(kernel, 1 if vectorised else 2, inputs, record_cmd=vectorised)
         if vectorised:
             Packed(command).function()()
-        return sums.numpy()
+        return o.sum.numpy()
+
+
+def _whole(values: list[int]) -> wp.array:
+    return wp.array(values, dtype=wp.int32)
+
+
+def _given() -> Pairs:
+    """Rows of two slots that have each other, each a cluster of its own."""
+    pairs = Pairs()
+    pairs.order, pairs.world, pairs.cluster = _whole([0, 1]), _whole([0, 0]), _whole([0, 1])
+    pairs.lead, pairs.count, pairs.index = _whole([0, 1, 2]), _whole([1, 1]), _whole([1, 0])
+    pairs.row, pairs.entry_stride = wp.array([0, 1], dtype=wp.int64), 1
+    return pairs
+
+
+def _found() -> Pairs:
+    """The row of one cluster of both, as it is found."""
+    pairs, real = Pairs(), FLOAT64.scalar
+    pairs.order, pairs.world, pairs.cluster = _whole([0, 1]), _whole([0, 0]), _whole([0, 0])
+    pairs.lead, pairs.count, pairs.index = _whole([0, 2]), _whole([0]), _whole([0] * 2 * AHEAD)
+    pairs.row, pairs.entry_stride = wp.array([0], dtype=wp.int64), 1
+    attic = Attic()
+    attic.first, attic.taken = wp.array([AHEAD, AHEAD], dtype=wp.int64), _whole([0])
+    columns = np.zeros(1, dtype=columns_type(FLOAT64).numpy_dtype())
+    columns["end"] = 2
+    blocks, supers = blocks_type(FLOAT64)(), supers_type(FLOAT64)()
+    blocks.of, blocks.begin, blocks.end = _whole([0, 0]), _whole([0]), _whole([2])
+    blocks.room, blocks.first, blocks.cluster = _whole([AHEAD]), _whole([0, 1]), _whole([0])
+    blocks.row = wp.array([0], dtype=wp.int64)
+    blocks.reach_squared = wp.array([[1.0]], dtype=real)
+    supers.lead, supers.block, supers.first = _whole([0]), _whole([0]), _whole([0, 1])
+    supers.cluster = _whole([0])
+    supers.middle, supers.half = (wp.zeros((3, 1), dtype=real) for _ in range(2))
+    planes = wp.zeros((3, 2 + 2 * SUPER), dtype=real)
+    laid, box = wp.array(columns, dtype=columns_type(FLOAT64)), wp.zeros(1, box_type(FLOAT64))
+    x, moved = wp.array(X, dtype=VEC3), _whole([1])
+    halve = halving_kernels(FLOAT64, OPEN)
+    wp.launch(halve.blocks, 1, [0, moved, laid, box, pairs.order, x, pairs.order, planes])
+    wp.launch(halve.supers, 1, [0, moved, laid, box, supers, pairs.order, planes])
+    found = [0, moved, box, blocks, laid, _whole([0]), supers, attic, planes, pairs, _whole([0])]
+    wp.launch(partners_kernel(FLOAT64, OPEN), 1, [*found, _whole([0])])
+    return pairs

@@ -262,34 +262,33 @@ def vector(width: int, c: str) -> str:
     return f"wp::vec_t<{width},{c}>"
 
 
-def grid_runs(grid: str, point: str, radius: str, visit: str) -> str:
-    """C++: ``visit`` for every run, from ``begin`` to ``end``, of the points around ``point``.
+def pointed(array: str, data: str, stride: str) -> str:
+    """C++: have an array point to other data. Rests on: ``array_t::data`` and ``strides``."""
+    return f"{array}.data = decltype({array}.data)({data}); {array}.strides[0] = {stride};"
 
-    The points, in the order of ``wp.hash_grid_point_id``, of all cells that ``wp.hash_grid_query``
-    would look through for that radius, whole runs of neighbouring cells at a time.
 
-    Rests on: the members of ``hash_grid_query_t`` and ``HashGrid_t``, and ``hash_grid_index``.
+def array_fields(kind: Any) -> list[tuple[str, Any]]:
+    """Fields of a struct that are arrays of one dimension, with what they hold, or structs.
+
+    Rests on: ``Struct.vars``, whose entries have a ``type``.
     """
-    return f"""
-    auto around = wp::hash_grid_query({grid}, {point}, {radius});
-    const auto& g = around.grid;
-    const int first_x = ((around.x_start % g.dim_x) + g.dim_x) % g.dim_x;
-    for (int z = around.z_start; z <= around.z_end; ++z)
-    for (int y = around.y_start; y <= around.y_end; ++y) {{
-        // Cells along x follow each other in the sorted order, but for the wrap: scan whole runs.
-        const int line = wp::hash_grid_index(g, 0, y, z);
-        int begin = 0, end = 0;
-        for (int cell = around.x_start, at = first_x; cell <= around.x_end; ++cell) {{
-            const int from = g.cell_starts[line + at], to = g.cell_ends[line + at];
-            at = at + 1 < g.dim_x ? at + 1 : 0;
-            if (from == to) continue;
-            if (from == end) {{ end = to; continue; }}
-            {visit}
-            begin = from; end = to;
-        }}
-        {visit}
-    }}
-"""
+    found = []
+    for name, each in kind.vars.items():
+        if wp.types.type_is_struct(each.type):
+            found.append((name, each.type))
+        elif isinstance(each.type, wp.array) and each.type.ndim == 1:
+            found.append((name, each.type.dtype))
+    return found
+
+
+def numbers_in(kind: Any, scalar: Any) -> int:
+    """How many numbers of that type a number or vector is made of; 0: it is something else.
+
+    Rests on: that vector types tell by ``_wp_scalar_type_`` and ``_length_``.
+    """
+    if kind is scalar:
+        return 1
+    return kind._length_ if getattr(kind, "_wp_scalar_type_", None) is scalar else 0
 
 
 def grid_shape(grid: wp.HashGrid) -> tuple[int, int, int]:

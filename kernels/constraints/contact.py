@@ -16,6 +16,7 @@ def contact_types(precision: Precision) -> tuple[Any, Any]:
     vec3, real = precision.vec3, precision.scalar
     data = {
         "x": wp.array(dtype=vec3),
+        "slot": wp.array(dtype=wp.int32),
         "radius": wp.array(dtype=real),  # less the slack
         "share": wp.array(dtype=real),  # w unit times the ways that normals are split
         "grip": wp.array(dtype=real),  # w unit times the ways that friction is split
@@ -67,11 +68,12 @@ def slack_kernels(precision: Precision, periodic: Periodicity) -> tuple[wp.Kerne
         i = pairs.order[s]
         x_i = b.x[i] - b.v[i] * dt  # where the substep began: the way since is no overlap
         factor = real(1.0)
-        for k in range(pairs.count[s]):
-            j = pairs.order[pairs.index[pairs.row[s] + wp.int64(k) * pairs.entry_stride]]
+        c = pairs.cluster[s]
+        for k in range(pairs.count[c]):
+            j = pairs.order[pairs.index[pairs.row[c] + wp.int64(k) * pairs.entry_stride]]
             reach = radius[i] + radius[j]
             r = wp.length(image(x_i - (b.x[j] - b.v[j] * dt), box[world]))
-            if r < factor * reach and b.w[i] + b.w[j] > real(0.0):
+            if j != i and r < factor * reach and b.w[i] + b.w[j] > real(0.0):
                 factor = r / reach
         slack_out[i] = radius[i] * (real(1.0) - factor)
 

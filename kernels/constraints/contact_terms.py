@@ -12,7 +12,7 @@ from typing import Any
 
 import warp as wp
 
-from ..engine.loops import reader
+from ..engine.loops import Term, reader
 from ..precision import APART, Precision, function
 from .constraints import bodies_type, place_function, rounding_function
 from .contact import contact_types
@@ -21,21 +21,21 @@ from .contact import contact_types
 def _separation_function(precision: Precision) -> wp.Function:
     """Distance and direction of a pair, also of a coincident one, without a branch.
 
-    Coincident particles get one of eight directions by the difference of their slots: opposite for
-    the two, the same in a batch as alone, and not all in one line.
+    Coincident particles get one of eight directions by the difference of their slots a and b:
+    opposite for the two, the same in a batch as alone, and not all in one line.
     """
     vec3, real = precision.vec3, precision.scalar
     ax, ay, az = map(precision.scalar, APART)
 
-    def separation(i: int, j: int, x_ij: vec3, r2: real, closest_squared: real):
+    def separation(a: int, b: int, x_ij: vec3, r2: real, closest_squared: real):
         apart = r2 > closest_squared
         r = wp.sqrt(wp.where(apart, r2, closest_squared))
-        k = wp.abs(i - j)
-        side = wp.where(apart, real(0.0), wp.where(i < j, real(-1.0), real(1.0)))
-        a = wp.where((k & 1) == 0, ax, -ax)
-        b = wp.where((k & 2) == 0, ay, -ay)
-        c = wp.where((k & 4) == 0, az, -az)
-        n = x_ij * (wp.where(apart, real(1.0), real(0.0)) / r) + vec3(a, b, c) * side
+        k = wp.abs(a - b)
+        side = wp.where(apart, real(0.0), wp.where(a < b, real(-1.0), real(1.0)))
+        nx = wp.where((k & 1) == 0, ax, -ax)
+        ny = wp.where((k & 2) == 0, ay, -ay)
+        nz = wp.where((k & 4) == 0, az, -az)
+        n = x_ij * (wp.where(apart, real(1.0), real(0.0)) / r) + vec3(nx, ny, nz) * side
         return r, n
 
     return function(separation)
@@ -57,13 +57,13 @@ def _of_pairs(precision: Precision) -> tuple[wp.Function, wp.Function, wp.Functi
     return _separation_function(precision), function(both), function(between)
 
 
-def crowding_term(precision: Precision, params: Any, bounce: bool) -> wp.Function:
+def crowding_term(precision: Precision, params: Any, bounce: bool) -> Term:
     """Term: n n^T of a pair in contact, as its six entries; bounce: that approached at first."""
     vec3, real, six = precision.vec3, precision.scalar, precision.vector(6)
     (Data, _), (separation, both, between) = contact_types(precision), _of_pairs(precision)
 
     def crowding(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
-        r, n = separation(i, j, x_ij, r2, p.closest_squared)
+        r, n = separation(d.slot[i], d.slot[j], x_ij, r2, p.closest_squared)
         weight = wp.where(r < both(d.radius, i, j), real(1.0), real(0.0))
         if wp.static(bounce):
             approach = wp.dot(n, between(d.way, i, j))
@@ -71,7 +71,7 @@ def crowding_term(precision: Precision, params: Any, bounce: bool) -> wp.Functio
         m = n * weight
         return six(m[0] * n[0], m[0] * n[1], m[0] * n[2], m[1] * n[1], m[1] * n[2], m[2] * n[2])
 
-    return function(crowding)
+    return Term(function(crowding), 6, rounding=None)
 
 
 def largest_eigenvalue(precision: Precision) -> wp.Function:
@@ -106,7 +106,7 @@ def largest_eigenvalue(precision: Precision) -> wp.Function:
     return function(bound)
 
 
-def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Function:
+def contact_term(precision: Precision, params: Any, friction: bool) -> Term:
     """Term: multiplier times direction of a pair's correction, and times its distance.
 
     lam = (R_i + R_j - r) / (c_i w_i + c_j w_j + alpha~) along the normal, c the crowding; friction
@@ -117,7 +117,7 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
     (Data, _), (separation, both, between) = contact_types(precision), _of_pairs(precision)
 
     def push(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
-        r, n = separation(i, j, x_ij, r2, p.closest_squared)
+        r, n = separation(d.slot[i], d.slot[j], x_ij, r2, p.closest_squared)
         reach = both(d.radius, i, j)
         touching = r < reach
         u = between(d.way, i, j)
@@ -142,10 +142,10 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> wp.Functi
             result = result - t * wp.min(real(1.0) / split, limit)
         return four(result[0], result[1], result[2], lam * r)
 
-    return function(push)
+    return Term(function(push), 4, rounding=None)
 
 
-def bounce_term(precision: Precision, params: Any) -> wp.Function:
+def bounce_term(precision: Precision, params: Any) -> Term:
     """Term: impulse that sends a pair off at e times the speed it approached with, and it times r.
 
     Mueller et al. (2020), eq. 34; the speed is that before the forces of the substep, so that
@@ -155,7 +155,7 @@ def bounce_term(precision: Precision, params: Any) -> wp.Function:
     (Data, _), (separation, both, between) = contact_types(precision), _of_pairs(precision)
 
     def bounce(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
-        r, n = separation(i, j, x_ij, r2, p.closest_squared)
+        r, n = separation(d.slot[i], d.slot[j], x_ij, r2, p.closest_squared)
         reach = both(d.radius, i, j)
         share = both(d.share, i, j)
         before = wp.dot(between(d.way, i, j), n)
@@ -165,7 +165,7 @@ def bounce_term(precision: Precision, params: Any) -> wp.Function:
         impulse = wp.where(hit, missing, real(0.0)) / wp.where(hit, share, real(1.0))
         return four(n[0] * impulse, n[1] * impulse, n[2] * impulse, impulse * r)
 
-    return function(bounce)
+    return Term(function(bounce), 4, rounding=None)
 
 
 def store_share(precision: Precision, params: Any) -> wp.Function:

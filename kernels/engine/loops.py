@@ -1,13 +1,14 @@
 """The loops over neighbours: one skeleton into which every pair term is plugged.
 
-A *term* is a Warp function ``term(i, j, x_ij, r2, d, p) -> vector`` of what particle j contributes
-to particle i. It reads per-particle arrays from the struct ``d`` (which always holds the positions
-``x``) and parameters from the struct ``p`` (which always holds ``cutoff_squared``). The loop sums
-the terms over the pairs within the cutoff; a coincident pair, r = 0, reaches the term as it is.
+A *term* gives what particle j contributes to particle i, by a Warp function ``(i, j, x_ij, r2, d,
+p)``. It reads per-particle arrays from the struct ``d`` (which always holds the positions ``x`` and
+the ``slot`` of each particle) at the indices i and j, and parameters from the struct ``p`` (which
+always holds ``cutoff_squared``). The loop sums the terms over the pairs within the cutoff; a
+coincident pair, r = 0, reaches the term as it is.
 
-Two builders make the same function: :func:`native_loop` for the CPU, where a C++ loop that
-reassociates the sum lets the compiler use the vector units (Warp's own loops never do), and
-:func:`plain_loop`, the reference, for CUDA.
+Two builders make the same loop: :func:`plain_loop`, the reference, in Warp's own language for CUDA,
+and :func:`~.packed.packed_loop` in C++ for the CPU's vector units. There i and j are places in
+copies that the loop has made, and only ``d.slot`` tells which particle is the first of a pair.
 """
 
 import functools
@@ -17,7 +18,7 @@ from typing import Any
 import warp as wp
 
 from ..precision import Precision, function, native, structure
-from ..warp_internals import elements, native_name, vector
+from ..warp_internals import elements, vector
 
 # Where the partners of slot i are: a row of a neighbour list, or the whole range of i's world.
 ROWS = "rows"
@@ -39,16 +40,48 @@ class Periodicity:
         return self.x or self.y or self.z
 
 
+@dataclass(frozen=True)
+class Term:
+    """What a loop sums.
+
+    A *central* one, with a ``direction``, gives two numbers (w, push): the contribution is then
+    w x_ij + push direction, the second for coincident pairs, whose x_ij is zero.
+
+    Args:
+        function: ``(i, j, x_ij, r2, d, p)``, which gives a vector.
+        width: Numbers of the sum.
+        direction: Of unit length.
+        rounding: As the compiler may have it: products and sums in one, products with reciprocals
+            in place of quotients; and ``"any"`` order of sums and products, too. None: as written.
+    """
+
+    function: wp.Function
+    width: int
+    direction: tuple[float, float, float] | None = None
+    rounding: str | None = "fused"
+
+    @property
+    def returned(self) -> int:
+        """Numbers that the function gives."""
+        return self.width if self.direction is None else 2
+
+
 @wp.struct
 class Pairs:
-    """Partners of every slot: list rows, or ranges. Slots are particles in the loop's own order."""
+    """Partners of every cluster of slots: list rows, or ranges.
+
+    Slots are particles in the loop's own order. The slots of a cluster follow each other and share
+    a row, which holds themselves too where they are more than one.
+    """
 
     order: wp.array(dtype=wp.int32)  # slot -> particle
     world: wp.array(dtype=wp.int32)  # slot -> world
     begin: wp.array(dtype=wp.int32)  # world -> first slot
     end: wp.array(dtype=wp.int32)  # world -> last slot + 1
-    count: wp.array(dtype=wp.int32)  # slot -> entries of its row
-    row: wp.array(dtype=wp.int64)  # slot -> where its row begins
+    lead: wp.array(dtype=wp.int32)  # cluster -> its first slot, and at the end that of one more
+    cluster: wp.array(dtype=wp.int32)  # slot -> cluster
+    count: wp.array(dtype=wp.int32)  # cluster -> entries of its row
+    row: wp.array(dtype=wp.int64)  # cluster -> where its row begins
     index: wp.array(dtype=wp.int32)  # the rows, slots
     entry_stride: wp.int64
 
@@ -81,11 +114,18 @@ def minimum_image(precision: Precision, periodic: Periodicity) -> wp.Function:
     return function(nearest_image)
 
 
-def native_image(precision: Precision, periodic: Periodicity) -> str:
-    """The same in C++, of the numbers ``dx``, ``dy`` and ``dz`` and the struct ``box``."""
+def native_image(
+    precision: Precision, periodic: Periodicity, name: str = "d{}", of: str = "d{}"
+) -> str:
+    """The same in C++, of the numbers ``dx``, ``dy`` and ``dz`` and the struct ``box``.
+
+    Args:
+        name: Of the numbers that are moved, with the axis for the braces.
+        of: Whose nearest image is wanted, a displacement.
+    """
     rint = "__builtin_rintf" if precision.c == "float" else "__builtin_rint"
     return "\n".join(
-        f"d{axis} -= box.length[{n}] * {rint}(d{axis} * box.inverse[{n}]);"
+        f"{name.format(axis)} -= box.length[{n}] * {rint}(({of.format(axis)}) * box.inverse[{n}]);"
         for n, (axis, on) in enumerate(zip("xyz", periodic, strict=True))
         if on
     )
@@ -116,23 +156,22 @@ def reader(precision: Precision, width: int | None = None) -> wp.Function:
 
 
 def plain_loop(
-    term: wp.Function, data: Any, params: Any, width: int, precision: Precision,
-    periodic: Periodicity, partners: str,
-) -> wp.Function:  # fmt: skip
+    term: Term, data: Any, params: Any, precision: Precision, periodic: Periodicity, partners: str
+) -> wp.Function:
     """The loop in Warp's own language: ``loop(i, pairs, box, d, p) -> vector(width)``."""
-    Box, total = box_type(precision), precision.vector(width)
-    image = minimum_image(precision, periodic)
-
-    rows = partners == ROWS
+    Box, total = box_type(precision), precision.vector(term.width)
+    image, give = minimum_image(precision, periodic), term.function
+    rows, central = partners == ROWS, term.direction is not None
+    aside = precision.vec3(*(term.direction or (0.0, 0.0, 0.0)))
 
     def plain_sum(i: int, pairs: Pairs, box: Box, d: data, p: params):
         x_i = d.x[i]
         result = total()
         row = wp.int64(0)
         if wp.static(rows):
-            row = pairs.row[i]
+            row = pairs.row[pairs.cluster[i]]
             first = 0
-            last = pairs.count[i]
+            last = pairs.count[pairs.cluster[i]]
         else:
             first = pairs.begin[pairs.world[i]]
             last = pairs.end[pairs.world[i]]
@@ -143,65 +182,11 @@ def plain_loop(
             x_ij = image(x_i - d.x[j], box)
             r2 = wp.dot(x_ij, x_ij)
             if j != i and r2 < p.cutoff_squared:
-                result += term(i, j, x_ij, r2, d, p)
+                t = give(i, j, x_ij, r2, d, p)
+                if wp.static(central):
+                    result += x_ij * t[0] + aside * t[1]
+                else:
+                    result += t
         return result
 
     return function(plain_sum, after_gradients=True)
-
-
-_HEAD = {
-    ROWS: f"""
-    const int first = 0, last = {elements("pairs.count", "int")}[i];
-    const int* row = {elements("pairs.index", "int")} + {elements("pairs.row", "long long")}[i];""",
-    ALL: f"""
-    const int w = {elements("pairs.world", "int")}[i];
-    const int first = {elements("pairs.begin", "int")}[w], last = {elements("pairs.end", "int")}[w];
-""",
-}
-_PARTNER = {ROWS: "row[{}]", ALL: "{}"}
-_INSIDE = {ROWS: "r2 < p.cutoff_squared", ALL: "(j != i) & (r2 < p.cutoff_squared)"}
-
-
-def native_loop(
-    term: wp.Function, data: Any, params: Any, width: int, precision: Precision,
-    periodic: Periodicity, partners: str,
-) -> wp.Function:  # fmt: skip
-    """The same loop as a C++ snippet that vectorises.
-
-    Outside the cutoff the term is evaluated at a harmless distance and multiplied away by a
-    select, so the loop has no branch of its own. Rows must be contiguous (entry stride 1).
-
-    The term is called once before, for nothing but what it reads of i, which the compiler then
-    keeps: within the loop, where it is called only inside the cutoff, a read may not be moved.
-    """
-    real, Box, total = precision.c, box_type(precision), precision.vector(width)
-    unit, vec3, sums = precision.scalar(1.0), precision.vec3, range(width)
-    call, partner, vec = native_name(term), _PARTNER[partners].format, vector(3, real)
-    snippet = f"""{_HEAD[partners]}
-    const {real}* x = {elements("d.x", real)};
-    const {real} xi = x[3*i], yi = x[3*i+1], zi = x[3*i+2];
-    {"".join(f"{real} sum{s} = 0; " for s in sums)}
-    if (first < last) {{
-#pragma clang fp reassociate(on) contract(fast)
-    {call}(i, {partner("first")}, {vec}(1, 0, 0), 1, d, p);
-#pragma clang loop vectorize(enable)
-    for (int k = first; k < last; ++k) {{
-        const int j = {partner("k")};
-        {real} dx = xi - x[3*j], dy = yi - x[3*j+1], dz = zi - x[3*j+2];
-        {native_image(precision, periodic)}
-        const {real} r2 = dx*dx + dy*dy + dz*dz;
-        const bool inside = {_INSIDE[partners]};
-        const {real} safe = inside ? r2 : ({real})1;
-        const {vector(width, real)} t = {call}(i, j, {vec}(dx, dy, dz), safe, d, p);
-        {"".join(f"sum{s} += inside ? t[{s}] : ({real})0; " for s in sums)}
-    }}
-    }}
-    {vector(width, real)} result;
-    {"".join(f"result[{s}] = sum{s}; " for s in sums)}
-    return result;
-"""
-
-    def native_sum(i: int, pairs: Pairs, box: Box, d: data, p: params) -> total:
-        term(i, i, vec3(), unit, d, p)
-
-    return native(native_sum, snippet)

@@ -1,4 +1,4 @@
-"""Verlet lists: cell coordinates, slots in the order of a hash grid, and when rows are made anew.
+"""Verlet lists: when rows are made anew, and for CUDA slots in the order of a hash grid.
 
 The grid is built in cell coordinates u = turn (x - origin), in which every cell is a unit cube.
 ``turn`` scales, and takes the axes in the order that has the grid's order follow the particles'
@@ -22,6 +22,23 @@ def cells_type(precision: Precision) -> Any:
     return structure(
         f"Cells_{precision.name}",
         {"origin": precision.vec3, "turn": precision.mat33, "first": wp.int32, "world": wp.int32},
+    )
+
+
+def blocks_type(precision: Precision) -> Any:
+    """The blocks of all worlds: their slots, how far they reach, and the room in their rows."""
+    return structure(
+        f"Blocks_{precision.name}",
+        {
+            "of": wp.array(dtype=wp.int32),  # slot -> block
+            "begin": wp.array(dtype=wp.int32),  # block -> first slot
+            "end": wp.array(dtype=wp.int32),  # block -> last slot + 1
+            "room": wp.array(dtype=wp.int32),  # block -> entries that a row has room for
+            "row": wp.array(dtype=wp.int64),  # block -> where its rows begin
+            "cluster": wp.array(dtype=wp.int32),  # block -> first cluster
+            "first": wp.array(dtype=wp.int32),  # world -> first block
+            "reach_squared": wp.array2d(dtype=precision.scalar),  # block, other of its world
+        },
     )
 
 
@@ -91,9 +108,11 @@ def build_kernels(precision: Precision) -> SimpleNamespace:
 
     @register
     def spread(
-        first: int, x_listed: wp.array(dtype=vec3), planes_out: wp.array2d(dtype=precision.scalar)
+        first: int,
+        x_listed: wp.array(dtype=vec3),
+        planes_out: wp.array2d(dtype=precision.scalar),
     ):
-        """Coordinates in planes, which vector units load without shuffling."""
+        """Coordinates in planes."""
         k = first + wp.tid()
         for a in range(3):
             planes_out[a, k] = x_listed[k][a]

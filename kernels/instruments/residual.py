@@ -118,10 +118,11 @@ def contact_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
         s = first + wp.tid()
         i = pairs.order[s]
         deepest = real(0.0)
-        for k in range(pairs.count[s]):
-            j = pairs.order[pairs.index[pairs.row[s] + wp.int64(k) * pairs.entry_stride]]
+        c = pairs.cluster[s]
+        for k in range(pairs.count[c]):
+            j = pairs.order[pairs.index[pairs.row[c] + wp.int64(k) * pairs.entry_stride]]
             r = wp.length(image(b.x[i] - b.x[j], box[pairs.world[s]]))
-            if b.w[i] + b.w[j] > real(0.0):
+            if j != i and b.w[i] + b.w[j] > real(0.0):
                 deepest = wp.max(deepest, radius[i] + radius[j] - r)
         miss_out[s] = deepest
 

@@ -6,24 +6,25 @@ from typing import Any
 
 import warp as wp
 
-from ..engine.loops import Pairs, Periodicity, box_type, native_loop, plain_loop, reader
-from ..precision import Precision, function, function_from_source, register
+from ..engine.loops import Pairs, Periodicity, Term, box_type, plain_loop, reader
+from ..engine.packed import FLAGS, packed_loop
+from ..precision import APART, Precision, function, function_from_source, register
 
 # A pair closer than p.closest is taken as that far apart, along a fixed direction: coincident
 # particles then push each other apart, equally and opposite.
 _SEPARATION = """
     near = p.closest_squared
-    side = wp.where(i < j, real(-1.0), real(1.0))
+    side = wp.where(d.slot[i] < d.slot[j], real(-1.0), real(1.0))
     apart = r2 > near
     r = wp.where(apart, wp.sqrt(r2), wp.sqrt(near))
-    along = x_ij + vec3(real(0.48), real(0.6), real(0.64)) * wp.where(apart, real(0.0), side * r)
 """
+_ALONG = "    along = x_ij + aside * wp.where(apart, real(0.0), side * r)\n"
 
 
 def force_term(
     law: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any,
     derivative: bool,
-) -> wp.Function:  # fmt: skip
+) -> Term:  # fmt: skip
     """Term f_ij = F(r) x_ij / r, with F the law itself or minus the derivative of an energy.
 
     ``arguments`` are the source of the law's arguments after ``r``, in terms of i, j, d and p.
@@ -34,12 +35,15 @@ def force_term(
         evaluate = f"    {', '.join(names)} = wp.grad(law)({call})\n    f = -g0"
     else:
         evaluate = f"    f = law({call})"
-    return _term("pair_force", evaluate, "along * (f / r)", {"law": law}, precision, data, params)
+    result = "pair2(f / r, wp.where(apart, real(0.0), side * f))"
+    names_of = {"law": law, "pair2": precision.vector(2)}
+    made = _term("pair_force", evaluate, result, names_of, precision, data, params)
+    return Term(made, 3, APART, "any" if derivative else "fused")
 
 
 def measure_term(
     energy: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any
-) -> wp.Function:
+) -> Term:
     """Term (u_ij / 2, w_ij / 2) of the potential energy and of the virial w = -r du/dr."""
     call = ", ".join(["r", *arguments])
     names = [f"g{k}" for k in range(len(arguments) + 1)]
@@ -48,12 +52,12 @@ def measure_term(
     )
     names_of = {"law": energy, "pair2": precision.vector(2)}
     result = "pair2(half * u, -half * r * g0)"
-    return _term("pair_measure", evaluate, result, names_of, precision, data, params)
+    return Term(_term("pair_measure", evaluate, result, names_of, precision, data, params), 2)
 
 
 def virial_term(
     force: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any
-) -> wp.Function:
+) -> Term:
     """Term (0, r F / 2) of a force that is given."""
     result = "pair2(real(0.0), real(0.5) * r * f)"
     return _plain_term("pair_virial", force, arguments, result, precision, data, params)
@@ -61,7 +65,7 @@ def virial_term(
 
 def energy_term(
     energy: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any
-) -> wp.Function:
+) -> Term:
     """Term (u_ij / 2, 0) of the potential energy alone."""
     result = "pair2(real(0.5) * f, real(0.0))"
     return _plain_term("pair_energy", energy, arguments, result, precision, data, params)
@@ -70,17 +74,17 @@ def energy_term(
 def _plain_term(
     name: str, law: wp.Function, arguments: list[str], result: str, precision: Precision,
     data: Any, params: Any,
-) -> wp.Function:  # fmt: skip
+) -> Term:  # fmt: skip
     """A term of a law's value f."""
     evaluate = f"    f = law({', '.join(['r', *arguments])})"
     names_of = {"law": law, "pair2": precision.vector(2)}
-    return _term(name, evaluate, result, names_of, precision, data, params)
+    return Term(_term(name, evaluate, result, names_of, precision, data, params), 2)
 
 
 def sum_term(
     law: wp.Function, arguments: list[str], width: int, fields: Mapping[str, Any],
     precision: Precision, data: Any, params: Any,
-) -> wp.Function:  # fmt: skip
+) -> Term:  # fmt: skip
     """Term that is a law of the pair by itself, a number or a vector of ``width`` numbers.
 
     ``arguments`` read what ``fields`` names, with its type, as ``read_<name>(d.<name>, j)``.
@@ -88,7 +92,7 @@ def sum_term(
     names = {"law": law, "one": precision.vector(1), **_readers(fields, precision)}
     call = f"law({', '.join(arguments)})"
     result = call if width > 1 else f"one({call})"
-    return _term("pair_sum", "", result, names, precision, data, params)
+    return Term(_term("pair_sum", _ALONG, result, names, precision, data, params), width)
 
 
 def _readers(fields: Mapping[str, Any], precision: Precision) -> dict[str, wp.Function]:
@@ -109,16 +113,14 @@ def _term(
     )
     namespace = {
         "wp": wp, "real": precision.scalar, "vec3": precision.vec3, "Data": data,
-        "Params": params, **names,
+        "Params": params, "aside": precision.vec3(*APART), **names,
     }  # fmt: skip
     # Behind the adjoints that the law may call.
     return function_from_source(source, namespace, after_gradients=True)
 
 
-def fused_term(
-    terms: list[wp.Function], precision: Precision, data: Any, params: Any
-) -> wp.Function:
-    """Sum of several terms of forces, each within its own cutoff, with its own data and parameters.
+def fused_term(terms: list[Term], precision: Precision, data: Any, params: Any) -> Term:
+    """Sum of several central terms of one direction, each within its own cutoff, with its own data and parameters.
 
     Beyond its own cutoff a term is evaluated inside it and multiplied away, so that the loop has
     no branch and a law is never asked where it need not be defined.
@@ -135,36 +137,41 @@ def fused_term(
     lines.append("    return " + " + ".join(f"w{k} * f{k}" for k in range(len(terms))))
     namespace = {
         "wp": wp, "real": precision.scalar, "vec3": precision.vec3, "Data": data, "Params": params,
-        **{f"term_{k}": term for k, term in enumerate(terms)},
+        **{f"term_{k}": term.function for k, term in enumerate(terms)},
     }  # fmt: skip
     # Emitted behind the terms, which may themselves stand behind the adjoints they call.
-    return function_from_source("\n".join(lines) + "\n", namespace, after_gradients=True)
+    made = function_from_source("\n".join(lines) + "\n", namespace, after_gradients=True)
+    roundings = [term.rounding for term in terms]
+    rounding = "any" if all(each == "any" for each in roundings) else "fused"
+    return Term(made, terms[0].width, terms[0].direction, rounding)
 
 
 def pair_kernel(
-    term: wp.Function, store: wp.Function, data: Any, params: Any, out: Any, width: int,
-    precision: Precision, periodic: Periodicity, partners: str, vectorised: bool,
+    term: Term, store: wp.Function, data: Any, params: Any, out: Any, precision: Precision,
+    periodic: Periodicity, partners: str, vectorised: bool,
 ) -> wp.Kernel:  # fmt: skip
     """Kernel: for every slot, sum ``term`` over its partners and hand the sum to ``store``.
 
     ``store(i, particle, total, d, p, o)`` writes row i of the outputs in slot order, or row
-    ``particle`` of the state's.
+    ``particle`` of the state's. Rows of the launch are slots, or clusters where it is vectorised.
     """
-    key = (term, store, width, precision.name, tuple(periodic), partners, vectorised)
+    key = (term, store, precision.name, tuple(periodic), partners, vectorised)
     if key not in _KERNELS:
-        make = native_loop if vectorised else plain_loop
-        loop = make(term, data, params, width, precision, periodic, partners)
-        _KERNELS[key] = _pair_kernel(loop, store, data, params, out, precision, vectorised)
+        own = (data, params, out, precision, periodic, partners)
+        _KERNELS[key] = (
+            _packed_kernel(term, store, *own) if vectorised else _pair_kernel(term, store, *own)
+        )
     return _KERNELS[key]
 
 
 _KERNELS: dict[tuple, wp.Kernel] = {}
 
 
-def _pair_kernel(loop, store, data, params, out, precision, vectorised) -> wp.Kernel:
+def _pair_kernel(term, store, data, params, out, precision, periodic, partners) -> wp.Kernel:
     Box = box_type(precision)
+    loop = plain_loop(term, data, params, precision, periodic, partners)
 
-    @functools.partial(register, cpu_only=vectorised)
+    @register
     def sum_over_partners(
         first: int,
         pairs: Pairs,
@@ -179,6 +186,26 @@ def _pair_kernel(loop, store, data, params, out, precision, vectorised) -> wp.Ke
         store(i, pairs.order[i], loop(i, pairs, box[w], d, p), d, p, o)
 
     return sum_over_partners
+
+
+def _packed_kernel(term, store, data, params, out, precision, periodic, partners) -> wp.Kernel:
+    Box = box_type(precision)
+    loop = packed_loop(term, store, data, params, out, precision, periodic, partners)
+
+    @functools.partial(register, cpu_only=True, flags=FLAGS[term.rounding])
+    def sum_over_packed(
+        first: int,
+        pairs: Pairs,
+        box: wp.array(dtype=Box),
+        parameters: wp.array(dtype=params),
+        d: data,
+        o: out,
+    ):
+        c = first + wp.tid()
+        w = pairs.world[pairs.lead[c]]
+        loop(c, pairs, box[w], d, parameters[w], o)
+
+    return sum_over_packed
 
 
 @functools.cache

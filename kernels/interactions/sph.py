@@ -16,7 +16,7 @@ from typing import Any
 
 import warp as wp
 
-from ..engine.loops import Periodicity, box_type, minimum_image, reader
+from ..engine.loops import Periodicity, Term, box_type, minimum_image, reader
 from ..precision import Precision, function, function_from_source, register
 from ..warp_internals import arguments as arguments_of
 
@@ -35,7 +35,7 @@ def bound_law(
     return function_from_source(source, {"law": law, "real": precision.scalar, "Params": params})
 
 
-def density_term(weight: wp.Function, precision: Precision, data: Any, params: Any) -> wp.Function:
+def density_term(weight: wp.Function, precision: Precision, data: Any, params: Any) -> Term:
     """Term m_j w(q), the density without the normalisation of W."""
     real, vec3, one = precision.scalar, precision.vec3, precision.vector(1)
     read = reader(precision)
@@ -43,7 +43,7 @@ def density_term(weight: wp.Function, precision: Precision, data: Any, params: A
     def add_density(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
         return one(read(d.m, j) * weight(wp.sqrt(r2) * p.inverse_h))
 
-    return function(add_density)
+    return Term(function(add_density), 1)
 
 
 @functools.cache
@@ -75,21 +75,19 @@ def keep_state(
 def force_term(
     slope: wp.Function, viscosity: wp.Function | None, dimension: int, precision: Precision,
     data: Any, params: Any,
-) -> wp.Function:  # fmt: skip
+) -> Term:  # fmt: skip
     """Term f_ij / m_i = -m_j (P_i/rho_i^2 + P_j/rho_j^2 + Pi_ij) grad_i W_ij.
 
     grad W vanishes with r, so coincident particles are taken as h apart along a fixed direction,
     in the order of their slots: they push each other apart, equally and opposite.
     """
-    real, vec3 = precision.scalar, precision.vec3
-    direction = precision.vec3(*DIRECTIONS[dimension])
+    real, vec3, pair2 = precision.scalar, precision.vec3, precision.vector(2)
     state_of, velocity_of = reader(precision, 4), reader(precision, 3)
     viscous = viscosity is not None
 
     def push(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
         apart = r2 > p.closest_squared
-        side = wp.where(i < j, -p.smoothing_length, p.smoothing_length)
-        along = x_ij + direction * wp.where(apart, real(0.0), side)
+        side = wp.where(d.slot[i] < d.slot[j], -p.smoothing_length, p.smoothing_length)
         distance2 = wp.where(apart, r2, p.smoothing_length * p.smoothing_length)
         state_i = state_of(d.state, i)
         state_j = state_of(d.state, j)
@@ -100,19 +98,22 @@ def force_term(
             stress += viscosity(wp.dot(v_ij, x_ij), distance2, mean[1], mean[3], p)
         # In this order no factor leaves the range of float32 before the others bring it back.
         gradient = (state_j[0] * p.sigma) * slope(wp.sqrt(distance2) * p.inverse_h)
-        return (along * p.inverse_h) * (-gradient * stress * p.inverse_h)
+        w = (-gradient * stress * p.inverse_h) * p.inverse_h
+        return pair2(w, wp.where(apart, real(0.0), side * w))
 
-    return function(push)
+    return Term(function(push), 3, DIRECTIONS[dimension])
 
 
-def virial_term(force: wp.Function, precision: Precision, data: Any, params: Any) -> wp.Function:
+def virial_term(force: Term, precision: Precision, data: Any, params: Any) -> Term:
     """Term x_ij . f_ij / 2, the particle's share of the virial."""
     real, vec3, one = precision.scalar, precision.vec3, precision.vector(1)
+    push = force.function
 
     def add_virial(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
-        return one(real(0.5) * d.m[i] * wp.dot(x_ij, force(i, j, x_ij, r2, d, p)))
+        t = push(i, j, x_ij, r2, d, p)
+        return one(real(0.5) * d.m[i] * t[0] * wp.dot(x_ij, x_ij))
 
-    return function(add_virial)
+    return Term(function(add_virial), 1)
 
 
 @functools.cache

@@ -19,6 +19,7 @@ from ..engine.state import State
 from ..kernels.constraints import contact as kernels
 from ..kernels.constraints import contact_terms as terms
 from ..kernels.constraints.constraints import bodies_type
+from ..kernels.engine.loops import Term
 from ..kernels.interactions.pair import pair_kernel
 from .easing import EasedConstraint, Easing
 from .limits import contact_limits
@@ -170,23 +171,22 @@ class Contact(EasedConstraint):
                 terms.crowding_term(precision, self._Params, bounce),
                 terms.store_share,
                 Shares,
-                6,
             )
             for bounce in (False, True)
         )
         self.bounce_kernel = self._kernel(
             terms.bounce_term(precision, self._Params), terms.store_impulse,
-            bodies_type(precision), 4,
+            bodies_type(precision),
         )  # fmt: skip
 
     @property
     def _Params(self) -> Any:
         return self.everywhere[0]
 
-    def _kernel(self, term: wp.Function, store: Any, out: Any, width: int) -> wp.Kernel:
+    def _kernel(self, term: Term, store: Any, out: Any) -> wp.Kernel:
         model = self.model
         return pair_kernel(
-            term, store(model.precision, self._Params), self.Data, self._Params, out, width,
+            term, store(model.precision, self._Params), self.Data, self._Params, out,
             model.precision, model.periodic, self.pairs.partners, model.vectorised,
         )  # fmt: skip
 
@@ -195,7 +195,7 @@ class Contact(EasedConstraint):
         return self._kernel(
             terms.contact_term(precision, self._Params, friction),
             lambda *types: terms.store_correction(*types, self.compensated),
-            bodies_type(precision), 4,
+            bodies_type(precision),
         )  # fmt: skip
 
     def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
@@ -220,6 +220,7 @@ class Contact(EasedConstraint):
     def _data(self, dt: float) -> Any:
         """The copies in slot order, as the terms take them."""
         data = self.Data()
+        data.slot = self.pairs.slots
         for name, array in self.copies.items():
             setattr(data, name, array)
         data.virial, data.inverse_dt, data.unit = self.virial, 1.0 / dt, self.model.mass_unit
@@ -227,7 +228,7 @@ class Contact(EasedConstraint):
 
     def _sum(self, kernel: wp.Kernel, params: wp.array, data: Any, out: Any) -> None:
         inputs = [self.pairs.pairs, self.model.box, params, data, out]
-        launch(kernel, self.count, inputs, self.model.device)
+        launch(kernel, self.pairs.rows, inputs, self.model.device)
 
     def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
         passes = self.passes[min(self.sweep, 1)] if self.count and dt > 0 else []

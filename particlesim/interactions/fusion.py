@@ -15,11 +15,12 @@ import warp as wp
 from ..engine.model import filled
 from ..engine.neighbors.lists import Neighbors
 from ..engine.state import State
+from ..kernels.engine.loops import Term
 from ..kernels.interactions import pair as kernels
 from ..kernels.precision import structure
 from ..scene.part import Interaction
 from .pair import Pair
-from .pair_loop import PairLoop
+from .pair_loop import OWN, PairLoop
 
 
 class PairPass(Interaction):
@@ -49,26 +50,27 @@ class PairPass(Interaction):
         return " + ".join(part.name for part in self.parts)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        self.loop.sum(self.term, kernels.add_force, {"f": state.force}, 3)
+        self.loop.sum(self.term, kernels.add_force, {"f": state.force})
 
 
-def _fused(parts: Sequence[Pair]) -> tuple[PairLoop, wp.Function]:
+def _fused(parts: Sequence[Pair]) -> tuple[PairLoop, Term]:
     """The loop and the term of several pair forces together."""
     model, pairs = parts[0].model, parts[0].pairs
     precision, names = model.precision, {f"part_{k}": part for k, part in enumerate(parts)}
     loops = {name: part.loop for name, part in names.items()}
-    Data = structure("FusedData", {"x": wp.array(dtype=precision.vec3)}
-                     | {name: loop.Data for name, loop in loops.items()})  # fmt: skip
-    Params = structure("FusedParameters", {"cutoff_squared": precision.scalar}
-                       | {name: loop.Params for name, loop in loops.items()})  # fmt: skip
+    own = {"x": wp.array(dtype=precision.vec3), "slot": wp.array(dtype=wp.int32)}
+    Data = structure("FusedData", own | {name: loop.Data for name, loop in loops.items()})  # fmt: skip
+    numbers = dict.fromkeys(sorted(OWN), precision.scalar)
+    Params = structure("FusedParameters", numbers | {name: loop.Params for name, loop in loops.items()})  # fmt: skip
     data, columns = Data(), {}
-    data.x = pairs.fields["position"]
+    data.x, data.slot = pairs.fields["position"], pairs.slots
     for name, part in names.items():
-        setattr(data, name, filled(part.loop.Data, part.fields_of(pairs)))
+        fields = {**part.fields_of(pairs), "slot": pairs.slots}
+        setattr(data, name, filled(part.loop.Data, fields))
         columns[name] = part.params.numpy()
-    columns["cutoff_squared"] = np.max(
-        [each["cutoff_squared"] for each in columns.values()], axis=0
-    )
+    of_parts = list(columns.values())
+    for name in OWN:
+        columns[name] = np.max([each[name] for each in of_parts], axis=0)
     params = model.structures(Params, columns)
     term = kernels.fused_term([part.term for part in parts], precision, Data, Params)
     return PairLoop(model, pairs, Data, data, Params, params), term

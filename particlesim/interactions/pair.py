@@ -16,6 +16,7 @@ from ..engine.neighbors.all_pairs import AllPairs
 from ..engine.neighbors.lists import Neighbors
 from ..engine.probe import Probe
 from ..engine.state import State
+from ..kernels.engine.loops import Term
 from ..kernels.interactions import pair as kernels
 from ..scene.law import Law
 from ..scene.law import law as make_law
@@ -135,7 +136,7 @@ class Pair(Interaction):
         own = {name: pairs.fields[name] for name in self.quantities if name != "position"}
         return {"x": pairs.fields["position"], **own}
 
-    def _term(self, make: Callable[..., wp.Function], k: int, **options: bool) -> wp.Function:
+    def _term(self, make: Callable[..., Term], k: int, **options: bool) -> Term:
         """A term of the k-th law."""
         precision = self.model.precision
         arguments = self.arguments[k].source({"_i": "i", "_j": "j"})
@@ -143,7 +144,7 @@ class Pair(Interaction):
         return make(law, arguments, precision, Data, self.Params, **options)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        self.loop.sum(self.term, kernels.add_force, {"f": state.force}, 3)
+        self.loop.sum(self.term, kernels.add_force, {"f": state.force})
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the gradient at the present distances and, within a cutoff, at those to come."""
@@ -158,7 +159,7 @@ class Pair(Interaction):
             if self.potential is not None:
                 terms.append(self._term(kernels.energy_term, 0))
         for term in terms:
-            self.loop.sum(term, kernels.store_measure, out, 2)
+            self.loop.sum(term, kernels.store_measure, out)
 
 
 class PairPotential(Pair):

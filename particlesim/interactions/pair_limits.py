@@ -13,6 +13,7 @@ from ..engine.limit import Limit, explicit_step
 from ..engine.model import filled
 from ..engine.probe import Probe
 from ..kernels.engine.loops import Pairs
+from ..kernels.engine.packed import AHEAD
 from ..kernels.interactions.pair import add_force
 
 POINTS = 1024  # distances at which a law is asked, from the cutoff inwards
@@ -142,16 +143,21 @@ def forces(part: Any, probe: Probe, w: int, couples: np.ndarray, r: np.ndarray) 
     pairs = Pairs()
     pairs.order = model.array(slots, wp.int32)
     pairs.world = model.array(np.full(2 * count, w), wp.int32)
-    pairs.count = model.array(np.ones(2 * count), wp.int32)
-    pairs.index = model.array(slots ^ 1, wp.int32)
-    pairs.row, pairs.entry_stride = model.array(slots, wp.int64), 1
-    fields = {"x": model.array(x.astype(precision.numpy), precision.vec3)}
+    pairs.lead = model.array(np.arange(0, 2 * count + 1, 2), wp.int32)
+    pairs.cluster = model.array(slots // 2, wp.int32)
+    pairs.count = model.array(np.full(count, 2), wp.int32)
+    pairs.index = model.array(np.append(slots, np.zeros(AHEAD)), wp.int32)
+    pairs.row, pairs.entry_stride = model.array(2 * slots[:count], wp.int64), 1
+    room = np.zeros((2 * count + 1, 3), dtype=precision.numpy)
+    room[:-1] = x
+    fields = {"x": model.array(room, precision.vec3)[:-1], "slot": model.array(slots, wp.int32)}
     for name in part.quantities - {"position"}:
         source = probe.state[name]
         fields[name] = model.array(source.numpy()[particle], source.dtype)
     f = wp.zeros(2 * count, dtype=precision.vec3, device=model.device)
-    listed = SimpleNamespace(pairs=pairs, count=2 * count, partners=part.pairs.partners)
+    rows = count if model.vectorised else 2 * count
+    listed = SimpleNamespace(pairs=pairs, rows=rows, partners=part.pairs.partners)
     loop = replace(part.loop, pairs=listed, data=filled(part.loop.Data, fields))
-    loop.sum(part.term, add_force, {"f": f}, 3)
+    loop.sum(part.term, add_force, {"f": f})
     values = f.numpy()[1::2, 0].astype(np.float64).reshape(len(couples), len(r))
     return np.clip(np.nan_to_num(values), -LARGEST, LARGEST)

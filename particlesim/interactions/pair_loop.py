@@ -12,6 +12,7 @@ import warp as wp
 from .. import validate
 from ..engine.execution.launch import launch
 from ..engine.model import Model, filled, structure_of
+from ..kernels.engine.loops import Term
 from ..kernels.interactions.pair import pair_kernel
 from ..scene.law import Law
 
@@ -45,14 +46,14 @@ class PairLoop:
         params: wp.array,
     ) -> Self:  # fmt: skip
         """A loop that reads these arrays."""
+        fields = {**fields, "slot": pairs.slots}
         Data = structure_of(f"{name}Data", fields)
         return cls(model, pairs, Data, filled(Data, fields), Params, params)
 
     def sum(
-        self, term: wp.Function, store: Callable[..., wp.Function], out: Mapping[str, wp.array],
-        width: int,
-    ) -> None:  # fmt: skip
-        """Sum a term of ``width`` numbers over the partners of every slot, and store the sums.
+        self, term: Term, store: Callable[..., wp.Function], out: Mapping[str, wp.array]
+    ) -> None:
+        """Sum a term over the partners of every slot, and store the sums.
 
         Args:
             term: See :mod:`particlesim.kernels.engine.loops`.
@@ -64,10 +65,10 @@ class PairLoop:
         Out = structure_of("PairSums", out)
         kernel = pair_kernel(
             term, store(model.precision, self.Data, self.Params, Out), self.Data, self.Params, Out,
-            width, model.precision, model.periodic, self.pairs.partners, model.vectorised,
+            model.precision, model.periodic, self.pairs.partners, model.vectorised,
         )  # fmt: skip
         inputs = [self.pairs.pairs, model.box, self.params, self.data, filled(Out, out)]
-        launch(kernel, self.pairs.count, inputs, model.device)
+        launch(kernel, self.pairs.rows, inputs, model.device)
 
 
 def squared_distances(owner: str, model: Model, cutoff: np.ndarray | None) -> dict[str, np.ndarray]:

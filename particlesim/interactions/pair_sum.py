@@ -192,7 +192,7 @@ class PairSum:
         store = functools.partial(
             kernels.sum_store, then, arguments, width, place, array.dtype, kinds
         )
-        loop.sum(term, store, {"sum": array}, width)
+        loop.sum(term, store, {"sum": array})
 
     def _called(
         self, bound: Arguments, index: Mapping[str, str], extra: Mapping[str, str]

@@ -11,23 +11,25 @@ import particlesim as ps
 from particlesim.engine.execution.threads import Team
 from particlesim.engine.model import Model
 from particlesim.kernels import self_check
-from particlesim.kernels.engine import loops, rows
+from particlesim.kernels.engine import packed, partners
+from particlesim.kernels.interactions import pair
 from particlesim.kernels.warp_internals import Packed
 
 
 def no_points(monkeypatch):
-    """A wrong result: the grid's insides tell of no neighbours."""
-    monkeypatch.setattr(rows, "grid_runs", lambda *args: "")
+    """A wrong result: nobody finds a partner."""
+    none = "__builtin_memset(hit, 0, sizeof(hit));"
+    monkeypatch.setattr(partners, "_hits", lambda *args: none)
 
 
 def another_term(monkeypatch):
     """A wrong result: sums that lie in another order in memory."""
-    monkeypatch.setattr(loops, "elements", lambda array, c: f"(({c}*){array}.data + 1)")
+    monkeypatch.setattr(packed, "elements", lambda array, c: f"(({c}*){array}.data + 1)")
 
 
 def no_such_name(monkeypatch):
     """An exception: native code does not find the law by its name, and does not compile."""
-    monkeypatch.setattr(loops, "native_name", lambda function: "no_such_function")
+    monkeypatch.setattr(packed, "native_name", lambda function: "no_such_function")
 
 
 def not_loaded(monkeypatch):
@@ -54,6 +56,8 @@ def unchecked():
     def forget():
         self_check.fast_ways.cache_clear()
         self_check._kernel.cache_clear()
+        partners.partners_kernel.cache_clear()
+        pair._KERNELS.clear()
 
     forget()
     yield

@@ -164,10 +164,10 @@ def test_names_are_the_same_in_every_process():
         "from particlesim.kernels.precision import FLOAT64\n"
         "from particlesim.kernels.engine.loops import Periodicity\n"
         "from particlesim.kernels.warp_internals import native_name\n"
-        "made = row_functions(FLOAT64, Periodicity(), True)\n"
+        "made = row_functions(FLOAT64, Periodicity())\n"
         "print(*map(native_name, made))\n"
     )
-    here = [internals.native_name(each) for each in row_functions(FLOAT64, OPEN, True)]
+    here = [internals.native_name(each) for each in row_functions(FLOAT64, OPEN)]
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
     )

@@ -9,6 +9,7 @@ import warp as wp
 
 from ...kernels.engine import neighbors as kernels
 from ...kernels.engine.loops import ALL, Pairs
+from ...kernels.engine.packed import CROWD
 from ..execution.launch import launch
 from ..model import Model
 from ..state import State
@@ -37,10 +38,19 @@ class AllPairs:
         self.pairs.world = self.world
         self.pairs.begin = model.array(self.begin_host, wp.int32)
         self.pairs.end = model.array(self.end_host, wp.int32)
+        self.slots = model.array(np.arange(self.count), wp.int32)
+        self.rows: int | None = None  # of a pass over it: clusters of slots
         self.users: list[str] = []
         # By world: whether it renews the list before interactions, and before constraints.
         self.for_interactions, self.for_constraints = np.zeros((2, model.world_count), dtype=bool)
         self.leader = np.zeros(model.world_count, dtype=int)  # see Neighbors
+
+    def _set_clusters(self, lead: np.ndarray) -> None:
+        """Clusters of slots that begin here; at the end the first slot of one more."""
+        model, sizes = self.model, np.diff(lead)
+        self.rows, self.of_cluster = len(sizes), sizes
+        self.pairs.lead = model.array(lead, wp.int32)
+        self.pairs.cluster = model.array(np.repeat(np.arange(len(sizes)), sizes), wp.int32)
 
     @property
     def work(self) -> float:
@@ -53,13 +63,16 @@ class AllPairs:
 
     def allocate(self, state: State) -> None:
         """Make the arrays, once all requests are in."""
+        if self.rows is None:
+            size = CROWD if self.model.vectorised else 1
+            worlds = zip(self.begin_host, self.end_host, strict=True)
+            leads = [np.arange(begin, end, size) for begin, end in worlds]
+            self._set_clusters(np.append(np.concatenate(leads), self.count))
         self.pairs.order = self.order
         for name in sorted(self.names):
             source = state[name]
             if self.sorted:
-                self.fields[name] = wp.zeros(
-                    self.count, dtype=source.dtype, device=self.model.device
-                )
+                self.fields[name] = self.array(source.dtype)
             else:
                 self.fields[name] = source
 
@@ -81,8 +94,8 @@ class AllPairs:
             )
 
     def array(self, dtype: Any) -> wp.array:
-        """A new array over the slots."""
-        return wp.zeros(self.count, dtype=dtype, device=self.model.device)
+        """A new array over the slots, and one entry behind them that may be read."""
+        return wp.zeros(self.count + 1, dtype=dtype, device=self.model.device)[: self.count]
 
     def describe(self) -> str:
         """One line for reports."""

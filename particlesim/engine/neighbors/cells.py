@@ -34,7 +34,7 @@ def grid_over(model: Model, block: Block, x: np.ndarray) -> tuple[wp.HashGrid, A
     for axis, on in enumerate(model.periodic):
         if on:
             scale[axis] = cells[axis] / model.box_length[w, axis]
-    axes, backward = _slowest_last(x)
+    axes, backward = slowest_last(x)
     turn = np.zeros((3, 3))
     turn[range(3), axes] = np.where(backward, -scale, scale)[axes]
     dimensions = (int(c) for c in cells[axes])
@@ -47,7 +47,7 @@ def grid_over(model: Model, block: Block, x: np.ndarray) -> tuple[wp.HashGrid, A
     return grid, place
 
 
-def _slowest_last(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def slowest_last(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Axes by how far particles in their own order advance along them, and which go backward.
 
     A grid numbers its cells by the last axis first. Where that is the order of the particles too,

@@ -1,15 +1,14 @@
-"""Verlet lists, built from ``wp.HashGrid`` or by looking at a whole world.
+"""Verlet lists: rows of neighbours that last until particles have moved.
 
-A list holds for every slot the slots nearer than cutoff + skin, and stays valid until a particle
-has moved half the skin; then the lists of that particle's world are rebuilt, and of no other, so
-that a world in a batch goes exactly as it goes alone. Worlds are kept apart by construction: a
-large world has hash grids of its own, one for each of its blocks, a small one is looked through
-directly.
+A list holds for every cluster of slots the slots nearer than cutoff + skin, and stays valid until a
+particle has moved half the skin; then the lists of that particle's world are rebuilt, and of no
+other, so that a world in a batch goes exactly as it goes alone. Worlds are kept apart by
+construction: a large world has hash grids of its own, one for each of its blocks.
 """
 
 from __future__ import annotations
 
-import functools
+import itertools
 from typing import Any
 
 import numpy as np
@@ -17,20 +16,24 @@ import warp as wp
 
 from ... import validate
 from ...kernels.engine import neighbors as kernels
-from ...kernels.engine import rows
+from ...kernels.engine.clusters import SMALL
 from ...kernels.engine.loops import ROWS
-from ...kernels.warp_internals import grid_shape
+from ...kernels.engine.packed import AHEAD
 from ..execution.launch import call, launch, when
 from ..model import Model
 from ..state import State
 from .all_pairs import AllPairs
 from .blocks import blocks, blocks_struct
-from .cells import grid_over
+from .clusters import ClusterRows
+from .hash_rows import HashRows
 
 # Skin over cutoff, where Settings leaves it open; measured. Grains have few partners, so that rows
 # cost little to hold and much to make.
 SKIN, SKIN_OF_CONTACTS = 0.12, 0.2
-DIRECT_CPU, DIRECT_CUDA = 512, 8192  # largest world that is looked through directly; measured
+DIRECT = 8192  # largest world that CUDA looks through directly; measured
+
+
+FEW = 64  # partners that there is room for before any have been looked for
 
 
 class VerletList(AllPairs):
@@ -40,21 +43,11 @@ class VerletList(AllPairs):
 
     def __init__(self, model: Model, members: np.ndarray):
         super().__init__(model, members)
+        self.sorted = True
         self.cutoff = np.zeros(model.world_count)  # 0: nothing is looked for in that world
         # By world: of particles that differ much in size, half the cutoff of each; else None.
         self.half: list[np.ndarray | None] = [None] * model.world_count
         self.generation = 0
-        self.grids: dict[int, tuple[wp.HashGrid, Any]] = {}  # by block
-
-    def _choose_search(self) -> None:
-        """Which worlds have a grid, and which are looked through directly."""
-        sizes = (self.end_host - self.begin_host) * (self.cutoff > 0)
-        limit = DIRECT_CPU if self.model.device.is_cpu else DIRECT_CUDA
-        self.large, small = sizes > limit, (sizes > 0) & (sizes <= limit)
-        self.has_direct = bool(small.any())
-        self.direct = self.model.array(small, wp.int32)
-        by_size = any(half is not None for half in self.half)
-        self.sorted = self.sorted or bool(self.large.any()) or by_size
 
     def _cut(self) -> np.ndarray:
         """Cut the worlds into blocks; returns the members in the order of their slots."""
@@ -73,7 +66,6 @@ class VerletList(AllPairs):
         model, device = self.model, self.model.device
         real, vec3 = model.precision.scalar, model.precision.vec3
         self._check_box()
-        self._choose_search()
         members = self._cut()
         self.members = model.array(members, wp.int32)
         # A hair less than half the skin, for the rounding of the distances compared.
@@ -83,21 +75,22 @@ class VerletList(AllPairs):
         ]
         self.margins_squared = [model.array(each, real) for each in margins]
         self.order = wp.clone(self.members)
-        self.slot = wp.zeros(self.count, dtype=wp.int32, device=device)
-        self.x_listed = wp.zeros(self.count, dtype=vec3, device=device)
-        self.cell_coordinate = wp.zeros(self.count, dtype=vec3, device=device)
+        self.x_listed = model.array(state["position"].numpy()[members], vec3)
         self.moved = wp.zeros(model.world_count, dtype=wp.int32, device=device)
         self.any_moved = wp.zeros(1, dtype=wp.int32, device=device)
         self.overflow = wp.zeros(1, dtype=wp.int32, device=device)
-        self.pairs.count = wp.zeros(self.count, dtype=wp.int32, device=device)
-        self.found = wp.zeros(self.count, dtype=wp.int32, device=device)
+        Layout = ClusterRows if model.vectorised else HashRows
+        self._set_clusters(Layout.clusters(model, self.blocks))
+        self.pairs.count = wp.zeros(self.rows, dtype=wp.int32, device=device)
+        self.found = wp.zeros(self.rows, dtype=wp.int32, device=device)
         super().allocate(state)
-        self.planes = wp.zeros((3, self.count + rows.BLOCK), dtype=real, device=device)
-        start = state["position"].numpy()[members].astype(np.float64)
-        for k, block in enumerate(self.blocks):
-            if self.large[block.world] and block.count:
-                self.grids[k] = grid_over(model, block, start[block.begin : block.end])
-        self._resize(np.full(len(self.blocks), 32))
+        sizes = (self.end_host - self.begin_host) * (self.cutoff > 0)
+        self.layout = Layout(self, sizes > (SMALL if model.device.is_cpu else DIRECT))
+        # By block: its clusters follow each other, as blocks do.
+        self.edges = np.searchsorted(
+            self.pairs.lead.numpy(), [*(block.begin for block in self.blocks), self.count]
+        )
+        self._make_room(np.full(self.rows, FEW))
         self.mark_all()
         self.update(state)
         self.grow()
@@ -113,37 +106,22 @@ class VerletList(AllPairs):
                         float(length), "enlarge the box or shorten the cutoff",
                     )  # fmt: skip
 
-    def _resize(self, room: np.ndarray) -> None:
-        """Rows of so many neighbours, by block: contiguous if vectorised, interleaved for CUDA.
-
-        Those of blocks by size are always contiguous, as they are of very different lengths.
-        """
-        model = self.model
-        stride = -(-(room + rows.SPARE) // 16) * 16
-        self.room = stride - rows.SPARE
+    def _make_room(self, found: np.ndarray) -> None:
+        """Rows for as many as were found, by cluster, and longer ones than there were."""
+        entries = self.layout.make_room(found)
+        self.index = wp.zeros(entries, dtype=wp.int32, device=self.model.device)
+        self.pairs.index = self.index
         self.generation += 1
-        counts = np.array([block.count for block in self.blocks])
-        of_slot = np.repeat(np.arange(len(counts)), counts)
-        contiguous = model.vectorised or len(counts) > model.world_count
-        if contiguous:
-            begin = np.concatenate([[0], np.cumsum(stride[of_slot])])
-        else:
-            self.room[:] = self.room.max()
-            begin = np.append(np.arange(self.count), self.count * stride.max())
-        self.index = wp.zeros(int(begin[-1]), dtype=wp.int32, device=model.device)
-        self.pairs.index, self.pairs.row = self.index, model.array(begin[:-1], wp.int64)
-        self.pairs.entry_stride = 1 if contiguous else max(1, self.count)
-        self.struct.room = model.array(self.room, wp.int32)
 
     @property
     def work(self) -> float:
         """Pairs that are listed at present."""
-        return float(self.pairs.count.numpy().sum())
+        return float(self.pairs.count.numpy() @ self.of_cluster)
 
     @property
     def capacity(self) -> int:
         """Neighbours that the longest rows have room for."""
-        return int(self.room.max())
+        return int(self.layout.room.max())
 
     def mark_all(self) -> None:
         """Have the next update rebuild every world."""
@@ -189,67 +167,15 @@ class VerletList(AllPairs):
 
     def rebuild(self) -> None:
         """Make the rows of the worlds marked as moved from ``x_listed``, and unmark them."""
-        for w in sorted({self.blocks[k].world for k in self.grids}):
-            with when(self.moved[w : w + 1]):
-                self._rebuild_grids(w)
-        if self.has_direct:
-            self._rebuild_direct()
+        self.layout.rebuild()
         call(self.moved.zero_)
         call(self.any_moved.zero_)
-
-    def _rebuild_grids(self, w: int) -> None:
-        model, device = self.model, self.model.device
-        mine = [(self.blocks[k], *grid) for k, grid in self.grids.items()]
-        mine = [each for each in mine if each[0].world == w]
-        to_cells = kernels.cell_coordinates_kernel(model.precision)
-        sort = kernels.build_kernels(model.precision).sort_slots
-        for block, grid, place in mine:
-            u = self.cell_coordinate[block.begin : block.end]
-            launch(to_cells, block.count, [place, self.x_listed, self.cell_coordinate], device)
-            call(functools.partial(grid.build, u, 1.0))
-            launch(
-                sort,
-                block.count,
-                [grid.id, place, self.members, self.x_listed, self.order, self.slot, self.planes],
-                device,
-            )
-        make = rows.grid_rows_kernel(model.precision, model.periodic, model.vectorised)
-        for block, _, _ in mine:
-            for k, (other, grid, place) in enumerate(mine):
-                reach = block.reach[k]
-                launch(
-                    make,
-                    block.count,
-                    [grid.id, place, block.begin, reach / other.own, int(k > 0),
-                     model.box, reach**2, self.struct, self.slot, self.planes, self.pairs,
-                     self.found, self.overflow],
-                    device,
-                )  # fmt: skip
-
-    def _rebuild_direct(self) -> None:
-        model = self.model
-        spread = kernels.build_kernels(model.precision).spread
-        launch(spread, self.count, [self.x_listed, self.planes], model.device)
-        make = rows.direct_rows_kernel(model.precision, model.periodic, model.vectorised)
-        launch(
-            make,
-            self.count,
-            [self.direct, model.box, self.moved, self.struct, self.planes, self.pairs, self.found,
-             self.overflow],
-            model.device,
-        )  # fmt: skip
 
     def lengthen(self) -> bool:
         """If a row was full: make room for as many as were found. The rows are then empty."""
         if not self.overflow.numpy()[0]:
             return False
-        found = self.found.numpy()
-        longest = [found[each.begin : each.end].max(initial=0) for each in self.blocks]
-        full = np.array(longest) > self.room
-        # The rows that were full may have been those of an earlier substep: always longer than now.
-        full |= not full.any()
-        longer = 1.25 * np.maximum(longest, self.room) + 8
-        self._resize(np.where(full, longer.astype(int), self.room))
+        self._make_room(self.found.numpy())
         self.overflow.zero_()
         return True
 
@@ -271,29 +197,40 @@ class VerletList(AllPairs):
         return found
 
     def describe(self) -> str:
-        grids = ["{} x {} x {}".format(*grid_shape(grid)) for grid, _ in self.grids.values()]
-        how = f"hash grid {grids[0]}" if grids else "direct search"
-        how += f" and {len(grids) - 1} more" if len(grids) > 1 else ""
-        mean = self.pairs.count.numpy().sum() / max(1, self.count)
+        mean = self.work / max(1, self.count)
         looking = [block for block in self.blocks if self.cutoff[block.world] > 0]
         least = min((block.reach.min() for block in looking), default=0.0)
         most = max((block.reach.max() for block in looking), default=0.0)
         reach = f"{most:g}" if least == most else f"{least:g} to {most:g}"
         return (
-            f"within {reach} of {self.count} particles, {mean:.0f} neighbours on "
-            f"average, room for {self.capacity}, {how}, for {', '.join(self.users)}"
+            f"within {reach} of {self.count} particles, {mean:.0f} listed on average, room for "
+            f"{self.capacity}, {self.layout.describe()}, for {', '.join(self.users)}"
         )
 
     @property
     def memory(self) -> int:
-        own = [self.x_listed, self.cell_coordinate, self.slot, self.index, self.pairs.count,
-               self.pairs.row, self.found]  # fmt: skip
+        own = [self.x_listed, self.index, self.pairs.count, self.pairs.row, self.found,
+               self.pairs.lead, self.pairs.cluster, *self.layout.arrays]  # fmt: skip
         return super().memory + sum(a.capacity for a in own)
 
     def neighbors_of(self, particle: int) -> np.ndarray:
-        """Particles in the row of ``particle``: all within the cutoff, and some in the skin."""
-        order = self.order.numpy()
+        """Particles listed for ``particle``: all within the cutoff, and some in the skin."""
+        order, pairs = self.order.numpy(), self.pairs
         slot = int(np.nonzero(order == particle)[0][0])
-        entries = np.arange(self.pairs.count.numpy()[slot])
-        at = self.pairs.row.numpy()[slot] + entries * self.pairs.entry_stride
-        return order[self.index.numpy()[at]]
+        cluster = pairs.cluster.numpy()[slot]
+        entries = np.arange(pairs.count.numpy()[cluster])
+        listed = self.index.numpy()[pairs.row.numpy()[cluster] + entries * pairs.entry_stride]
+        return order[listed[self._within(slot, listed)]]
+
+    def _within(self, slot: int, others: np.ndarray) -> np.ndarray:
+        """Which of these slots are within the reach of one; a cluster's row has some beyond it."""
+        members, of = self.members.numpy(), self.struct.of.numpy()
+        x = np.zeros((self.model.particle_count, 3))
+        x[members] = self.x_listed.numpy()
+        world, order = int(self.world.numpy()[slot]), self.order.numpy()
+        d = x[order[others]] - x[order[slot]]
+        length = self.model.box_length[world]
+        d -= np.where(length > 0, length * np.round(d / np.where(length > 0, length, 1.0)), 0.0)
+        first = self.struct.first.numpy()[world]
+        reach = self.blocks[of[slot]].reach[of[others] - first]
+        return (others != slot) & ((d**2).sum(axis=1) < reach**2)

@@ -201,7 +201,7 @@ class SPH(Interaction):
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         self._sum_density(state)
-        self.loop.sum(self.force_term, kernels.add_force, {"f": state.force}, 3)
+        self.loop.sum(self.force_term, kernels.add_force, {"f": state.force})
 
     def _sum_density(self, state: State, sounds: bool = False) -> None:
         """Density, pressure and their slots; speeds of sound for a viscosity, or if asked for."""
@@ -209,7 +209,7 @@ class SPH(Interaction):
         laws = self.laws["pressure"], self.laws["sound_speed"] if sounds else None
         store = functools.partial(kernels.keep_state, self.weight, *laws)
         out = {"state": self.slot_state, "rho": state.density, "pressure": state.pressure}
-        self.loop.sum(self.density_term, store, out, 1)
+        self.loop.sum(self.density_term, store, out)
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By sound with viscosity, and by acceleration."""
@@ -241,7 +241,7 @@ class SPH(Interaction):
         precision, energy_law = self.model.precision, self.laws["energy"]
         term = kernels.virial_term(self.force_term, precision, self.loop.Data, self.Params)
         store = functools.partial(kernels.keep_measure, energy_law)
-        self.loop.sum(term, store, {"energy": energy, "virial": virial}, 1)
+        self.loop.sum(term, store, {"energy": energy, "virial": virial})
 
     def interpolate(self, points: Any, field: Any, **options: Any) -> np.ndarray:
         """Of a simulation: ``sim.interpolate(fluid, points, field)``."""

@@ -1,0 +1,172 @@
+"""Clusters of slots on a CPU: four particles that are near each other, and their partners.
+
+A block of slots, in the order of :mod:`columns <particlesim.kernels.engine.columns>`, is cut into
+*supers* of sixteen, and each of these is halved along its longest side, twice, which makes four
+clusters of four. Worlds too small for columns are halved all the way. The four of a super look for
+partners together: in the supers near it, sixteen slots at a time.
+"""
+
+import functools
+from types import SimpleNamespace
+from typing import Any
+
+import warp as wp
+
+from ..precision import Precision, native, register, structure
+from ..warp_internals import columns, elements
+from .columns import columns_type
+from .loops import Periodicity, box_type, minimum_image, native_image
+from .packed import CLUSTER
+
+SUPER = 16  # slots
+SMALL = 512  # largest world that is halved all the way; measured
+
+
+def supers_type(precision: Precision) -> Any:
+    """Supers of all blocks."""
+    fields = {
+        "lead": wp.array(dtype=wp.int32),  # super -> first slot
+        "block": wp.array(dtype=wp.int32),  # super -> block
+        "first": wp.array(dtype=wp.int32),  # block -> first super, and at the end one more
+        "cluster": wp.array(dtype=wp.int32),  # super -> first cluster
+        "middle": wp.array2d(dtype=precision.scalar),  # axis, super: of the box around it
+        "half": wp.array2d(dtype=precision.scalar),  # axis, super: half its lengths
+    }
+    return structure(f"Supers_{precision.name}", fields)
+
+
+def _halved(precision: Precision, periodic: Periodicity) -> wp.Function:
+    """``halve(first, n, box, order, x)``: slots in an order by halves of their longest side."""
+    real, Box = precision.c, box_type(precision)
+    moved = native_image(precision, periodic, "d{}")
+    snippet = f"""
+    constexpr int MOST = {SMALL};
+    const long long stride = {columns("x")};
+    {real}* planes[3];
+    for (int c = 0; c < 3; ++c) planes[c] = {elements("x", real)} + c * stride + first;
+    int* slots = {elements("order", "int")} + first;
+    {real} v[3][MOST], kept[MOST];
+    int from[MOST], rank[MOST], moved[MOST];
+    for (int k = 0; k < n; ++k) {{
+        {real} dx = planes[0][k] - planes[0][0], dy = planes[1][k] - planes[1][0],
+               dz = planes[2][k] - planes[2][0];
+        {moved}
+        v[0][k] = dx, v[1][k] = dy, v[2][k] = dz, from[k] = k;
+    }}
+    int todo[64], size[64], left = 1;
+    todo[0] = 0, size[0] = n;
+    while (left--) {{
+        const int lo = todo[left], m = size[left];
+        if (m <= {CLUSTER}) continue;
+        int axis = 0;
+        {real} longest = -1;
+        for (int c = 0; c < 3; ++c) {{
+            {real} low = v[c][lo], high = low;
+            for (int k = lo; k < lo + m; ++k) {{
+                low = v[c][k] < low ? v[c][k] : low;
+                high = v[c][k] > high ? v[c][k] : high;
+            }}
+            if (high - low > longest) longest = high - low, axis = c;
+        }}
+        const {real}* value = v[axis] + lo;
+        for (int k = 0; k < m; ++k) {{
+            int before = 0;
+            const {real} mine = value[k];
+            for (int j = 0; j < k; ++j) before += value[j] <= mine;
+            for (int j = k + 1; j < m; ++j) before += value[j] < mine;
+            rank[k] = before;
+        }}
+        for (int c = 0; c < 3; ++c) {{
+            for (int k = 0; k < m; ++k) kept[rank[k]] = v[c][lo + k];
+            for (int k = 0; k < m; ++k) v[c][lo + k] = kept[k];
+        }}
+        for (int k = 0; k < m; ++k) moved[rank[k]] = from[lo + k];
+        for (int k = 0; k < m; ++k) from[lo + k] = moved[k];
+        const int some = (m / 2 + {SUPER - 1}) / {SUPER} * {SUPER};
+        const int half = m > {SUPER} ? some : m > {SUPER // 2} ? {SUPER // 2} : {CLUSTER};
+        todo[left] = lo, size[left++] = half;
+        todo[left] = lo + half, size[left++] = m - half;
+    }}
+    for (int c = 0; c < 3; ++c) {{
+        for (int k = 0; k < n; ++k) kept[k] = planes[c][k];
+        for (int k = 0; k < n; ++k) planes[c][k] = kept[from[k]];
+    }}
+    for (int k = 0; k < n; ++k) moved[k] = slots[k];
+    for (int k = 0; k < n; ++k) slots[k] = moved[from[k]];
+"""
+
+    def halve(
+        first: int, n: int, box: Box, order: wp.array(dtype=wp.int32),
+        x: wp.array2d(dtype=precision.scalar),
+    ): ...  # fmt: skip
+
+    return native(halve, snippet, after_gradients=False)
+
+
+@functools.cache
+def halving_kernels(precision: Precision, periodic: Periodicity) -> SimpleNamespace:
+    """Kernels: small blocks halved all the way; supers of large ones halved, and boxed."""
+    real, vec3, Box = precision.scalar, precision.vec3, box_type(precision)
+    Supers, Columns = supers_type(precision), columns_type(precision)
+    halve, image = _halved(precision, periodic), minimum_image(precision, periodic)
+
+    @functools.partial(register, cpu_only=True)
+    def empty_attics(
+        first: int, moved: wp.array(dtype=wp.int32), taken_out: wp.array(dtype=wp.int32)
+    ):
+        w = first + wp.tid()
+        if moved[w] != 0:
+            taken_out[w] = 0
+
+    @functools.partial(register, cpu_only=True)
+    def halve_blocks(
+        first: int,
+        moved: wp.array(dtype=wp.int32),
+        blocks: wp.array(dtype=Columns),
+        box: wp.array(dtype=Box),
+        members: wp.array(dtype=wp.int32),
+        x: wp.array(dtype=vec3),
+        order_out: wp.array(dtype=wp.int32),
+        planes_out: wp.array2d(dtype=real),
+    ):
+        c = blocks[first + wp.tid()]
+        if moved[c.world] == 0 or c.most > 0:
+            return
+        for i in range(c.begin, c.end):
+            order_out[i] = members[i]
+            for a in range(3):
+                planes_out[a, i] = x[i][a]
+        halve(c.begin, c.end - c.begin, box[c.world], order_out, planes_out)
+
+    @functools.partial(register, cpu_only=True)
+    def halve_supers(
+        first: int,
+        moved: wp.array(dtype=wp.int32),
+        blocks: wp.array(dtype=Columns),
+        box: wp.array(dtype=Box),
+        supers: Supers,
+        order_io: wp.array(dtype=wp.int32),
+        planes_io: wp.array2d(dtype=real),
+    ):
+        q = first + wp.tid()
+        c = blocks[supers.block[q]]
+        if moved[c.world] == 0:
+            return
+        s = supers.lead[q]
+        n = wp.min(c.end - s, 16)
+        b = box[c.world]
+        if c.most > 0:
+            halve(s, n, b, order_io, planes_io)
+        # The box around it, in one piece.
+        o = vec3(planes_io[0, s], planes_io[1, s], planes_io[2, s])
+        low = vec3()
+        high = vec3()
+        for i in range(s + 1, s + n):
+            d = image(vec3(planes_io[0, i], planes_io[1, i], planes_io[2, i]) - o, b)
+            low = wp.min(low, d)
+            high = wp.max(high, d)
+        for a in range(3):
+            supers.middle[a, q] = o[a] + real(0.5) * (low[a] + high[a])
+            supers.half[a, q] = real(0.5) * (high[a] - low[a])
+
+    return SimpleNamespace(attics=empty_attics, blocks=halve_blocks, supers=halve_supers)
