@@ -1,12 +1,13 @@
 """The fast ways on a CPU, tried once a process against Warp's own before they are trusted.
 
 Native loops and packed launches rest on Warp's insides (:mod:`particlesim.kernels.warp_internals`),
-which another Warp may have changed. Two particles find each other, and a law and its derivative are
-summed over their row: natively and packed, and by Warp's own loop and launch.
+which another Warp may have changed. Two clusters of particles find each other, and a law and its
+derivative are summed over their rows: natively and packed, and by Warp's own loop and launch.
 """
 
 import functools
 import warnings
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from .engine.clusters import SUPER, halving_kernels, supers_type
 from .engine.columns import columns_type
 from .engine.loops import ROWS, Pairs, Periodicity, Term, box_type
 from .engine.neighbors import blocks_type
-from .engine.packed import AHEAD
+from .engine.packed import AHEAD, CLUSTER
 from .engine.partners import Attic, partners_kernel
 from .interactions.pair import pair_kernel
 from .precision import FLOAT64, function, structure, translate
@@ -36,7 +37,7 @@ def fast_ways() -> bool:
     try:
         with watched(None):  # now, also where somebody records
             fast, plain = _sums(vectorised=True), _sums(vectorised=False)
-        # A sum of one term, with a handful of roundings in it.
+        # Sums of seven terms, with a handful of roundings in each.
         wrong = [] if np.allclose(fast, plain, rtol=1e-14, atol=0.0) else [f"{fast} not {plain}"]
     except Exception as error:
         wrong = [f"{type(error).__name__}: {error}"]
@@ -54,7 +55,8 @@ def _attraction(r2: float, strength: float):
     return strength / (1.5 + r2)
 
 
-X = np.array([(0.5, 0.5, 0.5), (1.25, 0.5, 0.5)])  # two particles
+X = np.array([(0.1 * k, 0.01 * k * k, 0.02 * k) for k in range(2 * CLUSTER)])
+N = len(X)
 
 
 @functools.cache
@@ -80,58 +82,65 @@ def _kernel(vectorised: bool) -> tuple[wp.Kernel, Any, Any, Any]:
 
 
 def _sums(vectorised: bool) -> np.ndarray:
-    """The law and its slope for each of two particles, (2, 2); NaN where nothing was written."""
+    """The law and its slope summed for each particle, (N, 2); NaN where nothing was written."""
     with wp.ScopedDevice("cpu"):
         pairs, box = _found() if vectorised else _given(), wp.zeros(1, dtype=box_type(FLOAT64))
         kernel, Data, Params, Out = _kernel(vectorised)
         p, d, o = Params(), Data(), Out()
         p.cutoff_squared, p.strength = 1.0, 3.0
-        d.x, d.slot = wp.array(np.pad(X, ((0, 1), (0, 0))), dtype=VEC3), _whole([0, 1])
-        o.sum = wp.full(2, value=PAIR(np.nan), dtype=PAIR)
+        d.x, d.slot = wp.array(np.pad(X, ((0, 1), (0, 0))), dtype=VEC3), _whole(range(N))
+        o.sum = wp.full(N, value=PAIR(np.nan), dtype=PAIR)
         inputs: list[Any] = [0, pairs, box, wp.array([p], dtype=Params), d, o]
-        command = wp.launch(kernel, 1 if vectorised else 2, inputs, record_cmd=vectorised)
+        command = wp.launch(kernel, 2 if vectorised else N, inputs, record_cmd=vectorised)
         if vectorised:
             Packed(command).function()()
         return o.sum.numpy()
 
 
-def _whole(values: list[int]) -> wp.array:
-    return wp.array(values, dtype=wp.int32)
+def _whole(values: Iterable[int]) -> wp.array:
+    return wp.array(list(values), dtype=wp.int32)
+
+
+def _pairs(size: int, rows: int) -> Pairs:
+    """Clusters of so many slots, with rows of so many entries."""
+    pairs, count = Pairs(), N // size
+    pairs.order, pairs.world = _whole(range(N)), _whole([0] * N)
+    pairs.cluster = _whole(k // size for k in range(N))
+    pairs.lead, pairs.count = _whole(range(0, N + 1, size)), _whole([rows] * count)
+    pairs.row = wp.array([rows * k for k in range(count)], dtype=wp.int64)
+    pairs.index, pairs.entry_stride = _whole([0] * (count * rows + AHEAD)), 1
+    return pairs
 
 
 def _given() -> Pairs:
-    """Rows of two slots that have each other, each a cluster of its own."""
-    pairs = Pairs()
-    pairs.order, pairs.world, pairs.cluster = _whole([0, 1]), _whole([0, 0]), _whole([0, 1])
-    pairs.lead, pairs.count, pairs.index = _whole([0, 1, 2]), _whole([1, 1]), _whole([1, 0])
-    pairs.row, pairs.entry_stride = wp.array([0, 1], dtype=wp.int64), 1
+    """Every slot a cluster, with all others for partners."""
+    pairs = _pairs(1, N - 1)
+    pairs.index = _whole(j for i in range(N) for j in range(N) if j != i)
     return pairs
 
 
 def _found() -> Pairs:
-    """The row of one cluster of both, as it is found."""
-    pairs, real = Pairs(), FLOAT64.scalar
-    pairs.order, pairs.world, pairs.cluster = _whole([0, 1]), _whole([0, 0]), _whole([0, 0])
-    pairs.lead, pairs.count, pairs.index = _whole([0, 2]), _whole([0]), _whole([0] * 2 * AHEAD)
-    pairs.row, pairs.entry_stride = wp.array([0], dtype=wp.int64), 1
+    """Rows of clusters as they are found."""
+    pairs, real = _pairs(CLUSTER, AHEAD), FLOAT64.scalar
     attic = Attic()
-    attic.first, attic.taken = wp.array([AHEAD, AHEAD], dtype=wp.int64), _whole([0])
+    attic.first, attic.taken = wp.array([2 * AHEAD] * 2, dtype=wp.int64), _whole([0])
     columns = np.zeros(1, dtype=columns_type(FLOAT64).numpy_dtype())
-    columns["end"] = 2
+    columns["end"] = N
     blocks, supers = blocks_type(FLOAT64)(), supers_type(FLOAT64)()
-    blocks.of, blocks.begin, blocks.end = _whole([0, 0]), _whole([0]), _whole([2])
+    blocks.of, blocks.begin, blocks.end = _whole([0] * N), _whole([0]), _whole([N])
     blocks.room, blocks.first, blocks.cluster = _whole([AHEAD]), _whole([0, 1]), _whole([0])
     blocks.row = wp.array([0], dtype=wp.int64)
     blocks.reach_squared = wp.array([[1.0]], dtype=real)
     supers.lead, supers.block, supers.first = _whole([0]), _whole([0]), _whole([0, 1])
     supers.cluster = _whole([0])
     supers.middle, supers.half = (wp.zeros((3, 1), dtype=real) for _ in range(2))
-    planes = wp.zeros((3, 2 + 2 * SUPER), dtype=real)
+    planes = wp.zeros((3, N + 2 * SUPER), dtype=real)
     laid, box = wp.array(columns, dtype=columns_type(FLOAT64)), wp.zeros(1, box_type(FLOAT64))
     x, moved = wp.array(X, dtype=VEC3), _whole([1])
     halve = halving_kernels(FLOAT64, OPEN)
     wp.launch(halve.blocks, 1, [0, moved, laid, box, pairs.order, x, pairs.order, planes])
     wp.launch(halve.supers, 1, [0, moved, laid, box, supers, pairs.order, planes])
-    found = [0, moved, box, blocks, laid, _whole([0]), supers, attic, planes, pairs, _whole([0])]
-    wp.launch(partners_kernel(FLOAT64, OPEN), 1, [*found, _whole([0])])
+    looked = [0, moved, box, blocks, laid, _whole([0]), supers, attic, planes, pairs]
+    counts = [_whole([0, 0]), _whole([0])]
+    wp.launch(partners_kernel(FLOAT64, OPEN), 1, [*looked, *counts])
     return pairs

@@ -118,7 +118,7 @@ class _Parts:
         room = [f"alignas(64) {self.real} b{axis}[OFF + {TILE}];" for axis in "xyz"]
         room.append("auto local = d;")
         for k, (path, kind, width) in enumerate(fields):
-            room.append(f"alignas(64) {kind} copy{k}[{width} * (OFF + {TILE})];")
+            room.append(f"alignas(64) {kind} copy{k}[{width} * (OFF + {TILE}) + 1];")
             room.append(pointed(f"local.{path}", f"copy{k}", f"{width} * sizeof({kind})"))
         room.append(f"alignas(64) {self.real} sum[{self.size}][{self.sums}][W] = {{}};")
         if self.central:
@@ -188,6 +188,7 @@ class _Parts:
         return f"""{begin}
         {moved}
         for (int k = m; k < top; ++k) bx[OFF+k] = {FAR[self.real]}, by[OFF+k] = bz[OFF+k] = 0;
+#pragma clang loop vectorize(disable)
         for (int k = 0; k < top; ++k) {{ {self._copied(fields, "OFF + k", at)} }}"""
 
     def _copied(self, fields: list[tuple[str, str, int]], to: str, at: str) -> str:
@@ -196,11 +197,12 @@ class _Parts:
             if path.rpartition(".")[2] == "slot":  # it holds its own places
                 lines.append(f"copy{k}[{to}] = {at};")
                 continue
-            source = elements(f"d.{path}", kind)
-            lines += [
-                f"copy{k}[{width} * ({to}) + {n}] = {source}[{width} * {at} + {n}];"
-                for n in range(width)
-            ]
+            # A vector of three as four, of which the last is the next one's, or spare.
+            many = 4 if width == 3 else width
+            lines.append(
+                f"__builtin_memcpy(copy{k} + {width} * ({to}), {elements(f'd.{path}', kind)} + "
+                f"{width} * (long long){at}, {many} * sizeof({kind}));"
+            )
         return " ".join(lines)
 
     def _fetched(self) -> str:

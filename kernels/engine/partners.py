@@ -136,7 +136,8 @@ def _hits(precision: Precision, periodic: Periodicity, image: bool) -> str:
     real = precision.c
     near = native_image(precision, periodic, "{}j", "{0}j - {0}m")
     each = native_image(precision, periodic)
-    return f"""
+    return f"""{{
+#pragma clang fp contract(fast)
 #pragma clang loop vectorize(enable)
     for (int l = 0; l < {SUPER}; ++l) {{
         {real} xj = px[s + l], yj = py[s + l], zj = pz[s + l];
@@ -154,6 +155,7 @@ def _hits(precision: Precision, periodic: Periodicity, image: bool) -> str:
             }}
             hit[t][l] = best < R2;
         }}
+    }}
     }}"""
 
 
@@ -176,6 +178,8 @@ def _look(precision: Precision, periodic: Periodicity) -> wp.Function:
         else _hits(precision, periodic, False)
     )
     snippet = f"""
+    typedef unsigned char Bytes __attribute__((vector_size(8)));
+    typedef int Ints __attribute__((vector_size(32)));
     static const unsigned long long lanes[256] = {{{_LANES}}};
     const long long stride = {columns("x")}, supers_n = {columns("supers.middle")};
     const {real} *px = {elements("x", real)}, *py = px + stride, *pz = py + stride;
@@ -255,7 +259,10 @@ def _look(precision: Precision, periodic: Periodicity) -> wp.Function:
                 const unsigned long long picks = lanes[mask];
                 if (n[t] + {LEAST} > space[t] && out[t] != lost) move(t);
                 int* to = out[t] == lost ? lost : out[t] + n[t];
-                for (int k = 0; k < 8; ++k) to[k] = s + h + (int)((picks >> (8 * k)) & 0xff);
+                Bytes chosen;
+                __builtin_memcpy(&chosen, &picks, sizeof(chosen));
+                const Ints at = __builtin_convertvector(chosen, Ints) + (s + h);
+                __builtin_memcpy(to, &at, sizeof(at));
                 n[t] += __builtin_popcount(mask);
             }}
         }}

@@ -23,8 +23,13 @@ def no_points(monkeypatch):
 
 
 def another_term(monkeypatch):
-    """A wrong result: sums that lie in another order in memory."""
-    monkeypatch.setattr(packed, "elements", lambda array, c: f"(({c}*){array}.data + 1)")
+    """A wrong result: positions that lie in another order in memory."""
+    elements = packed.elements
+
+    def shifted(array, c):
+        return f"({elements(array, c)} + {int(array == 'd.x')})"
+
+    monkeypatch.setattr(packed, "elements", shifted)
 
 
 def no_such_name(monkeypatch):
@@ -53,15 +58,17 @@ CHANGES = {
 def unchecked():
     """A process that has not looked yet, before and after."""
 
-    def forget():
-        self_check.fast_ways.cache_clear()
-        self_check._kernel.cache_clear()
-        partners.partners_kernel.cache_clear()
-        pair._KERNELS.clear()
-
     forget()
     yield
     forget()
+
+
+def forget():
+    """As if nothing had been made or tried."""
+    self_check.fast_ways.cache_clear()
+    self_check._kernel.cache_clear()
+    partners.partners_kernel.cache_clear()
+    pair._KERNELS.clear()
 
 
 def melt(liquid, execution="threads"):
@@ -85,8 +92,7 @@ def test_a_changed_warp_is_run_by_its_own_ways(change, unchecked, monkeypatch, l
         patch.setattr(Model, "vectorised", False)
         plain = melt(liquid, "graph")
     fast = melt(liquid)
-    self_check.fast_ways.cache_clear()
-    self_check._kernel.cache_clear()
+    forget()
     change(monkeypatch)
     with pytest.warns(RuntimeWarning, match="native loops and packed launches fail") as told:
         sims = [melt(liquid) for _ in range(2)]
