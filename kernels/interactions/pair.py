@@ -9,6 +9,7 @@ import warp as wp
 from ..engine.loops import Pairs, Periodicity, Term, box_type, plain_loop, reader
 from ..engine.packed import FLAGS, packed_loop
 from ..precision import APART, Precision, function, function_from_source, register
+from ..warp_internals import arguments as arguments_of
 
 # A pair closer than p.closest is taken as that far apart, along a fixed direction: coincident
 # particles then push each other apart, equally and opposite.
@@ -16,9 +17,27 @@ _SEPARATION = """
     near = p.closest_squared
     side = wp.where(d.slot[i] < d.slot[j], real(-1.0), real(1.0))
     apart = r2 > near
-    r = wp.where(apart, wp.sqrt(r2), wp.sqrt(near))
+    square = wp.where(apart, r2, near)
+    r = wp.sqrt(square)
 """
 _ALONG = "    along = x_ij + aside * wp.where(apart, real(0.0), side * r)\n"
+
+
+SQUARED = "distance_squared"  # a potential whose first argument is called so takes r^2
+
+
+def _of_distance(law: wp.Function, arguments: list[str]) -> tuple[str, bool]:
+    """A call of a law at the distance of the pair, and whether it takes the square."""
+    squared = next(iter(arguments_of(law))) == SQUARED
+    return f"law({', '.join(['square' if squared else 'r', *arguments])})", squared
+
+
+def _derived(law: wp.Function, arguments: list[str]) -> tuple[str, str]:
+    """Source that derives a potential, with a value of it, and F / r then."""
+    call, squared = _of_distance(law, arguments)
+    names = ", ".join(f"g{k}" for k in range(len(arguments) + 1))
+    evaluate = f"    {names} = wp.grad(law){call.removeprefix('law')}\n"
+    return evaluate, "real(-2.0) * g0" if squared else "-g0 / r"
 
 
 def force_term(
@@ -29,13 +48,12 @@ def force_term(
 
     ``arguments`` are the source of the law's arguments after ``r``, in terms of i, j, d and p.
     """
-    call = ", ".join(["r", *arguments])
     if derivative:
-        names = [f"g{k}" for k in range(len(arguments) + 1)]
-        evaluate = f"    {', '.join(names)} = wp.grad(law)({call})\n    f = -g0"
+        evaluate, w = _derived(law, arguments)
     else:
-        evaluate = f"    f = law({call})"
-    result = "pair2(f / r, wp.where(apart, real(0.0), side * f))"
+        evaluate, w = "", f"{_of_distance(law, arguments)[0]} / r"
+    evaluate += f"    w = {w}"
+    result = "pair2(w, wp.where(apart, real(0.0), side * w * r))"
     names_of = {"law": law, "pair2": precision.vector(2)}
     made = _term("pair_force", evaluate, result, names_of, precision, data, params)
     return Term(made, 3, APART, "any" if derivative else "fused")
@@ -45,13 +63,11 @@ def measure_term(
     energy: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any
 ) -> Term:
     """Term (u_ij / 2, w_ij / 2) of the potential energy and of the virial w = -r du/dr."""
-    call = ", ".join(["r", *arguments])
-    names = [f"g{k}" for k in range(len(arguments) + 1)]
-    evaluate = (
-        f"    {', '.join(names)} = wp.grad(law)({call})\n    u = law({call})\n    half = real(0.5)"
-    )
+    evaluate, w = _derived(energy, arguments)
+    call, _squared = _of_distance(energy, arguments)
+    evaluate += f"    u = {call}\n    w = {w}\n    half = real(0.5)"
     names_of = {"law": energy, "pair2": precision.vector(2)}
-    result = "pair2(half * u, -half * r * g0)"
+    result = "pair2(half * u, half * w * square)"
     return Term(_term("pair_measure", evaluate, result, names_of, precision, data, params), 2)
 
 
@@ -76,7 +92,7 @@ def _plain_term(
     data: Any, params: Any,
 ) -> Term:  # fmt: skip
     """A term of a law's value f."""
-    evaluate = f"    f = law({', '.join(['r', *arguments])})"
+    evaluate = f"    f = {_of_distance(law, arguments)[0]}"
     names_of = {"law": law, "pair2": precision.vector(2)}
     return Term(_term(name, evaluate, result, names_of, precision, data, params), 2)
 
@@ -120,7 +136,7 @@ def _term(
 
 
 def fused_term(terms: list[Term], precision: Precision, data: Any, params: Any) -> Term:
-    """Sum of several central terms of one direction, each within its own cutoff, with its own data and parameters.
+    """Sum of central terms of one direction, each with its own cutoff, data and parameters.
 
     Beyond its own cutoff a term is evaluated inside it and multiplied away, so that the loop has
     no branch and a law is never asked where it need not be defined.

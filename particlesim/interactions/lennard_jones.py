@@ -61,6 +61,19 @@ def _laws(n: int, m: int) -> tuple[Law, Law]:
     return mie_potential, mie_force
 
 
+@functools.cache
+def _even_potential(n: int, m: int) -> Law:
+    """Potential of the Mie family for even exponents, by the square of the distance."""
+    power_n, power_m = _power(n // 2), _power(m // 2)
+
+    @law
+    def mie_squared(distance_squared: float, strength: float, sigma: float, u_cut: float):
+        s = sigma * sigma / distance_squared
+        return strength * (power_n(s) - power_m(s)) - u_cut
+
+    return mie_squared
+
+
 class LennardJones(Pair):
     r"""Mie potential u = C epsilon ((sigma/r)^n - (sigma/r)^m), C = n/(n-m) (n/m)^(m/(n-m)).
 
@@ -106,10 +119,13 @@ class LennardJones(Pair):
         s = sigma / cut
         u_cut = strength * (s**n - s**m) if truncation != "cut" else 0.0
         f_cut = strength * (n * s**n - m * s**m) / cut if truncation == "force_shift" else 0.0
-        super().__init__(
-            *_laws(n, m), group, cut,
-            {"strength": strength, "sigma": sigma, "u_cut": u_cut, "f_cut": f_cut, "cut": cut},
-        )  # fmt: skip
+        parameters = {"strength": strength, "sigma": sigma, "u_cut": u_cut}
+        if n % 2 or m % 2 or truncation == "force_shift":
+            laws = _laws(n, m)
+            parameters |= {"f_cut": f_cut, "cut": cut}
+        else:
+            laws = _even_potential(n, m), None
+        super().__init__(*laws, group, cut, parameters)
 
     @property
     def acts(self) -> bool:
@@ -125,13 +141,13 @@ class LennardJones(Pair):
         Args:
             density: Particles a volume [1/length^3].
         """
-        (n, m), s, cut = self.exponents, self.sigma, self.parameters["cut"]
+        (n, m), s, cut = self.exponents, self.sigma, self.cutoff
         if m <= 3:
             raise validate.fail(self.name, "exponents", "be above 3", (n, m), "it has no tail")
         scale = 2.0 * np.pi * density * self.parameters["strength"]
         a = s**n * cut ** (3 - n) / (n - 3)
         b = s**m * cut ** (3 - m) / (m - 3)
-        u_cut, f_cut = self.parameters["u_cut"], self.parameters["f_cut"]
+        u_cut, f_cut = self.parameters["u_cut"], self.parameters.get("f_cut", 0.0)
         within = 2.0 * np.pi * density * cut**3
         energy = within * (u_cut / 3.0 + f_cut * cut / 12.0)
         virial = within * f_cut * cut / 4.0

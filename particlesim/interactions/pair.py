@@ -65,6 +65,11 @@ class Pair(Interaction):
                     self.name, "law", "take the distance r as its first parameter", each.name,
                     "write def law(r, ...)",
                 )  # fmt: skip
+            if each is force and next(iter(each.parameters)) == kernels.SQUARED:
+                raise validate.fail(
+                    self.name, f"law {each.name}", "take the distance r as its first parameter",
+                    kernels.SQUARED, "write def law(r, ...); a potential may take the square",
+                )  # fmt: skip
             check_names(self.name, each)
             if "cutoff" in each.parameters and self.cutoff is not None:
                 parameters = {**parameters, "cutoff": self.cutoff}
@@ -166,7 +171,8 @@ class PairPotential(Pair):
     """Pair force from an energy law: f = -du/dr, derived by ``wp.grad`` inside the kernel.
 
     Args:
-        law: ``u(r, ...)`` [energy]; made by :func:`particlesim.scene.law` or a plain function.
+        law: ``u(r, ...)`` [energy]; made by :func:`particlesim.scene.law` or a plain function. One
+            whose first parameter is called ``distance_squared`` gets r^2, which saves a root.
         group: Which particles interact with each other; None: all.
         cutoff: Distance beyond which there is no force [length]; None: all pairs of a world.
         **parameters: The law's further parameters; those not given are quantities of the two

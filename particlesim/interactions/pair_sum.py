@@ -21,7 +21,7 @@ from .arguments import Arguments
 from .pair_loop import OWN, PairLoop, check_names, squared_distances
 
 # What a law may name of the pair, and how many numbers it returns by what it says it returns.
-PAIR = {"r": "r", "x_ij": "along", "distance_squared": "wp.where(apart, r2, near)"}
+PAIR = {"r": "r", "x_ij": "along", "distance_squared": "square"}
 WIDTHS = {inspect.Signature.empty: 1, float: 1, wp.vec2: 2, wp.vec3: 3, wp.vec4: 4}
 READ = "read_{0}(d.{0}, {1})"
 

@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 
 from ..engine.model import Model
-from ..kernels.interactions.pair import values_kernel
+from ..kernels.interactions.pair import SQUARED, values_kernel
 from ..kernels.precision import FLOAT64, Precision, annotation, structure
 from .arguments import QUANTITIES, Arguments
 
@@ -65,13 +65,14 @@ def of_pairs(
         precision: In which it is computed.
     """
     distance = next(iter(arguments.law.parameters))
-    given = {distance: r}
+    squared = distance == SQUARED
+    given = {distance: r**2 if squared else r}
     for name, (kind, source) in zip(arguments.names, arguments.sources, strict=True):
         if kind != "parameter":
             given[name] = pairs[source][:, order.index(kind[-1])]
     by = distance if derived else None
     found = values(arguments, given, len(r), by=by, precision=precision)
-    return -found if derived else found
+    return (-2.0 * r if squared else -1.0) * found if derived else found
 
 
 def of_particles(
