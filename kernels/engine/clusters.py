@@ -12,10 +12,11 @@ from typing import Any
 
 import warp as wp
 
+from ..native import body
 from ..precision import Precision, native, register, structure
-from ..warp_internals import columns, elements
+from ..warp_internals import columns
 from .columns import columns_type
-from .loops import Periodicity, box_type, minimum_image, native_image
+from .loops import Periodicity, box_type, minimum_image
 from .packed import CLUSTER
 
 SUPER = 16  # slots
@@ -36,68 +37,17 @@ def supers_type(precision: Precision) -> Any:
 
 
 def _halved(precision: Precision, periodic: Periodicity) -> wp.Function:
-    """``halve(first, n, box, order, x)``: slots in an order by halves of their longest side."""
-    real, Box = precision.c, box_type(precision)
-    moved = native_image(precision, periodic, "d{}")
-    snippet = f"""
-    constexpr int MOST = {SMALL};
-    const long long stride = {columns("x")};
-    {real}* planes[3];
-    for (int c = 0; c < 3; ++c) planes[c] = {elements("x", real)} + c * stride + first;
-    int* slots = {elements("order", "int")} + first;
-    {real} v[3][MOST], kept[MOST];
-    int from[MOST], rank[MOST], moved[MOST];
-    for (int k = 0; k < n; ++k) {{
-        {real} dx = planes[0][k] - planes[0][0], dy = planes[1][k] - planes[1][0],
-               dz = planes[2][k] - planes[2][0];
-        {moved}
-        v[0][k] = dx, v[1][k] = dy, v[2][k] = dz, from[k] = k;
-    }}
-    int todo[64], size[64], left = 1;
-    todo[0] = 0, size[0] = n;
-    while (left--) {{
-        const int lo = todo[left], m = size[left];
-        if (m <= {CLUSTER}) continue;
-        int axis = 0;
-        {real} longest = -1;
-        for (int c = 0; c < 3; ++c) {{
-            {real} low = v[c][lo], high = low;
-            for (int k = lo; k < lo + m; ++k) {{
-                low = v[c][k] < low ? v[c][k] : low;
-                high = v[c][k] > high ? v[c][k] : high;
-            }}
-            if (high - low > longest) longest = high - low, axis = c;
-        }}
-        const {real}* value = v[axis] + lo;
-        for (int k = 0; k < m; ++k) {{
-            int before = 0;
-            const {real} mine = value[k];
-            for (int j = 0; j < k; ++j) before += value[j] <= mine;
-            for (int j = k + 1; j < m; ++j) before += value[j] < mine;
-            rank[k] = before;
-        }}
-        for (int c = 0; c < 3; ++c) {{
-            for (int k = 0; k < m; ++k) kept[rank[k]] = v[c][lo + k];
-            for (int k = 0; k < m; ++k) v[c][lo + k] = kept[k];
-        }}
-        for (int k = 0; k < m; ++k) moved[rank[k]] = from[lo + k];
-        for (int k = 0; k < m; ++k) from[lo + k] = moved[k];
-        const int some = (m / 2 + {SUPER - 1}) / {SUPER} * {SUPER};
-        const int half = m > {SUPER} ? some : m > {SUPER // 2} ? {SUPER // 2} : {CLUSTER};
-        todo[left] = lo, size[left++] = half;
-        todo[left] = lo + half, size[left++] = m - half;
-    }}
-    for (int c = 0; c < 3; ++c) {{
-        for (int k = 0; k < n; ++k) kept[k] = planes[c][k];
-        for (int k = 0; k < n; ++k) planes[c][k] = kept[from[k]];
-    }}
-    for (int k = 0; k < n; ++k) moved[k] = slots[k];
-    for (int k = 0; k < n; ++k) slots[k] = moved[from[k]];
-"""
+    """``halve(first, n, box, order_io, x_io)``: slots by halves of their longest side."""
+    Box = box_type(precision)
+    numbers = {
+        "MOST": SMALL, "SUPER": SUPER, "CLUSTER": CLUSTER, "PERIODIC": [int(on) for on in periodic],
+    }  # fmt: skip
+    arrays, macros = {"x": "x_io", "int* order": "order_io"}, {"stride": columns("x_io")}
+    snippet = body("engine/halve.cpp", precision, numbers, arrays, macros)
 
     def halve(
-        first: int, n: int, box: Box, order: wp.array(dtype=wp.int32),
-        x: wp.array2d(dtype=precision.scalar),
+        first: int, n: int, box: Box, order_io: wp.array(dtype=wp.int32),
+        x_io: wp.array2d(dtype=precision.scalar),
     ): ...  # fmt: skip
 
     return native(halve, snippet, after_gradients=False)
@@ -109,14 +59,6 @@ def halving_kernels(precision: Precision, periodic: Periodicity) -> SimpleNamesp
     real, vec3, Box = precision.scalar, precision.vec3, box_type(precision)
     Supers, Columns = supers_type(precision), columns_type(precision)
     halve, image = _halved(precision, periodic), minimum_image(precision, periodic)
-
-    @functools.partial(register, cpu_only=True)
-    def empty_attics(
-        first: int, moved: wp.array(dtype=wp.int32), taken_out: wp.array(dtype=wp.int32)
-    ):
-        w = first + wp.tid()
-        if moved[w] != 0:
-            taken_out[w] = 0
 
     @functools.partial(register, cpu_only=True)
     def halve_blocks(
@@ -169,4 +111,4 @@ def halving_kernels(precision: Precision, periodic: Periodicity) -> SimpleNamesp
             supers.middle[a, q] = o[a] + real(0.5) * (low[a] + high[a])
             supers.half[a, q] = real(0.5) * (high[a] - low[a])
 
-    return SimpleNamespace(attics=empty_attics, blocks=halve_blocks, supers=halve_supers)
+    return SimpleNamespace(blocks=halve_blocks, supers=halve_supers)

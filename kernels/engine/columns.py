@@ -7,7 +7,6 @@ block fills at every build.
 """
 
 import functools
-from types import SimpleNamespace
 from typing import Any
 
 import warp as wp
@@ -37,19 +36,37 @@ def columns_type(precision: Precision) -> Any:
     return structure(f"Columns_{precision.name}", fields)
 
 
-@functools.cache
-def columns_kernels(precision: Precision) -> SimpleNamespace:
-    """Kernels that sort a block by columns."""
-    vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
-    Columns = columns_type(precision)
+def _sizes(precision: Precision) -> tuple[wp.Function, wp.Function]:
+    """``side_of(spread, count, longest)`` of columns, and ``dims_of(length, side, c)``."""
+    vec3, real, Columns = precision.vec3, precision.scalar, columns_type(precision)
 
-    def cells_along(length: real, side: real, wraps: int):
-        n = wp.max(int(wp.floor(length / side)), 1)
-        if wraps == 0:
-            n = int(wp.floor(length / side)) + 1
+    def side_of(spread: vec3, count: real, longest: real):
+        """With it what is spread evenly has one cell for each sixteen."""
+        side = wp.where(longest > real(0.0), longest, real(1.0))
+        for _n in range(200):
+            cells = (spread[0] / side + real(1.0)) * (spread[1] / side + real(1.0))
+            if cells * (spread[2] / side + real(1.0)) * real(16.0) >= count:
+                break
+            side = side * real(0.9)
+        return side
+
+    def dims_of(length: vec3, side: real, c: Columns):
+        """Whole columns fill a periodic axis; an open one is covered."""
+        n = wp.vec3i(1, 1, 1)
+        width = vec3(real(0.125), real(1.0), real(1.0)) * side
+        for a in range(3):
+            k = int(wp.floor(length[a] / width[a]))
+            n[a] = wp.where(c.wraps[a] != 0, wp.max(k, 1), k + 1)
         return n
 
-    along = function(cells_along)
+    return function(side_of), function(dims_of)
+
+
+@functools.cache
+def lay_kernel(precision: Precision) -> wp.Kernel:
+    """Kernel: lay the columns of one block over what it fills."""
+    vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
+    Columns, (side_of, dims_of) = columns_type(precision), _sizes(precision)
 
     @functools.partial(register, cpu_only=True)
     def lay_columns(
@@ -59,7 +76,6 @@ def columns_kernels(precision: Precision) -> SimpleNamespace:
         x: wp.array(dtype=vec3),
         columns_io: wp.array(dtype=Columns),
     ):
-        """Over what a block fills: of the side that holds as many as a super, if even."""
         k = block + first + wp.tid()
         c = columns_io[k]
         o = x[c.begin]
@@ -77,34 +93,18 @@ def columns_kernels(precision: Precision) -> SimpleNamespace:
         length = vec3()
         spread = vec3()
         lower = vec3()
-        largest = real(0.0)
         for a in range(3):
             b = c.axes[a]
             m = mean[b] / count
             # An even spread over a length L has the variance L^2 / 12; outliers count for little.
             spread[a] = wp.sqrt(real(12.0) * wp.max(square[b] / count - m * m, real(0.0)))
-            length[a] = high[b] - low[b]
-            lower[a] = low[b]
-            if c.wraps[a] != 0:
-                length[a] = box[c.world].length[b]
-                lower[a] = box[c.world].lower[b]
-            largest = wp.max(largest, length[a])
-        side = wp.where(largest > real(0.0), largest, real(1.0))
-        # The side with which what is spread evenly has one cell for each super.
-        wanted = real(16.0) / count
-        for _n in range(200):
-            cells = (spread[0] / side + real(1.0)) * (spread[1] / side + real(1.0))
-            if cells * (spread[2] / side + real(1.0)) * wanted >= real(1.0):
-                break
-            side = side * real(0.9)
-        n = wp.vec3i(1, 1, 1)
-        for _n in range(400):
-            n[0] = along(length[0], side / real(8.0), c.wraps[0])
-            n[1] = along(length[1], side, c.wraps[1])
-            n[2] = along(length[2], side, c.wraps[2])
-            if real(n[0]) * real(n[1]) * real(n[2]) <= real(c.most):
-                break
+            length[a] = wp.where(c.wraps[a] != 0, box[c.world].length[b], high[b] - low[b])
+            lower[a] = wp.where(c.wraps[a] != 0, box[c.world].lower[b], low[b])
+        side = side_of(spread, count, wp.max(length))
+        n = dims_of(length, side, c)
+        while real(n[0]) * real(n[1]) * real(n[2]) > real(c.most):
             side = side * real(1.1)
+            n = dims_of(length, side, c)
         scale = vec3(real(8.0), real(1.0), real(1.0)) / side
         for a in range(3):
             if c.wraps[a] != 0:
@@ -112,6 +112,14 @@ def columns_kernels(precision: Precision) -> SimpleNamespace:
         columns_io[k].lower = lower
         columns_io[k].scale = scale
         columns_io[k].dims = n
+
+    return lay_columns
+
+
+@functools.cache
+def number_kernel(precision: Precision) -> wp.Kernel:
+    """Kernel: the bin of each member of a block, and as a place in the grid that sorts them."""
+    vec3, Columns = precision.vec3, columns_type(precision)
 
     def cell_of(x: vec3, a: int, c: Columns):
         n = c.dims[a]
@@ -136,7 +144,6 @@ def columns_kernels(precision: Precision) -> SimpleNamespace:
         bin_out: wp.array(dtype=wp.int32),
         place_out: wp.array(dtype=wp.vec3f),
     ):
-        """The bin of each member, and that number as a place in the grid that sorts them."""
         c = columns_in[k]
         i = c.begin + first + wp.tid()
         z = cell(x[i], 2, c)
@@ -151,6 +158,14 @@ def columns_kernels(precision: Precision) -> SimpleNamespace:
         bin_out[i] = number
         place_out[i] = wp.vec3f(float(number % 256) + 0.5, float(number / 256) + 0.5, 0.5)
 
+    return number_bins
+
+
+@functools.cache
+def sort_kernel(precision: Precision) -> wp.Kernel:
+    """Kernel: slots in the order of the grid, and at which slot each bin starts."""
+    vec3, real, Columns = precision.vec3, precision.scalar, columns_type(precision)
+
     @functools.partial(register, cpu_only=True)
     def sort_by_bins(
         first: int,
@@ -164,7 +179,6 @@ def columns_kernels(precision: Precision) -> SimpleNamespace:
         planes_out: wp.array2d(dtype=real),
         starts_out: wp.array(dtype=wp.int32),
     ):
-        """Slots in the order of the grid, and at which slot each bin starts."""
         c = columns_in[k]
         n = first + wp.tid()
         i = c.begin + wp.hash_grid_point_id(grid, n)
@@ -181,4 +195,4 @@ def columns_kernels(precision: Precision) -> SimpleNamespace:
             for b in range(bins[i] + 1, c.dims[0] * c.dims[1] * c.dims[2] + 1):
                 starts_out[c.first + b] = c.end
 
-    return SimpleNamespace(lay=lay_columns, number=number_bins, sort=sort_by_bins)
+    return sort_by_bins

@@ -114,23 +114,6 @@ def minimum_image(precision: Precision, periodic: Periodicity) -> wp.Function:
     return function(nearest_image)
 
 
-def native_image(
-    precision: Precision, periodic: Periodicity, name: str = "d{}", of: str = "d{}"
-) -> str:
-    """The same in C++, of the numbers ``dx``, ``dy`` and ``dz`` and the struct ``box``.
-
-    Args:
-        name: Of the numbers that are moved, with the axis for the braces.
-        of: Whose nearest image is wanted, a displacement.
-    """
-    rint = "__builtin_rintf" if precision.c == "float" else "__builtin_rint"
-    return "\n".join(
-        f"{name.format(axis)} -= box.length[{n}] * {rint}(({of.format(axis)}) * box.inverse[{n}]);"
-        for n, (axis, on) in enumerate(zip("xyz", periodic, strict=True))
-        if on
-    )
-
-
 @functools.cache
 def reader(precision: Precision, width: int | None = None) -> wp.Function:
     """``read(array, j)`` of numbers, or of vectors by their components, from an array without gaps.

@@ -59,9 +59,10 @@ def _fused(parts: Sequence[Pair]) -> tuple[PairLoop, Term]:
     precision, names = model.precision, {f"part_{k}": part for k, part in enumerate(parts)}
     loops = {name: part.loop for name, part in names.items()}
     own = {"x": wp.array(dtype=precision.vec3), "slot": wp.array(dtype=wp.int32)}
-    Data = structure("FusedData", own | {name: loop.Data for name, loop in loops.items()})  # fmt: skip
+    Data = structure("FusedData", own | {name: loop.Data for name, loop in loops.items()})
     numbers = dict.fromkeys(sorted(OWN), precision.scalar)
-    Params = structure("FusedParameters", numbers | {name: loop.Params for name, loop in loops.items()})  # fmt: skip
+    of_loops = {name: loop.Params for name, loop in loops.items()}
+    Params = structure("FusedParameters", numbers | of_loops)
     data, columns = Data(), {}
     data.x, data.slot = pairs.fields["position"], pairs.slots
     for name, part in names.items():

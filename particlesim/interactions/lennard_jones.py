@@ -120,11 +120,10 @@ class LennardJones(Pair):
         u_cut = strength * (s**n - s**m) if truncation != "cut" else 0.0
         f_cut = strength * (n * s**n - m * s**m) / cut if truncation == "force_shift" else 0.0
         parameters = {"strength": strength, "sigma": sigma, "u_cut": u_cut}
-        if n % 2 or m % 2 or truncation == "force_shift":
-            laws = _laws(n, m)
+        even = n % 2 == 0 and m % 2 == 0 and truncation != "force_shift"
+        laws: tuple[Law, Law | None] = (_even_potential(n, m), None) if even else _laws(n, m)
+        if not even:
             parameters |= {"f_cut": f_cut, "cut": cut}
-        else:
-            laws = _even_potential(n, m), None
         super().__init__(*laws, group, cut, parameters)
 
     @property
@@ -141,7 +140,7 @@ class LennardJones(Pair):
         Args:
             density: Particles a volume [1/length^3].
         """
-        (n, m), s, cut = self.exponents, self.sigma, self.cutoff
+        (n, m), s, cut = self.exponents, self.sigma, float(self.cutoff or 0.0)
         if m <= 3:
             raise validate.fail(self.name, "exponents", "be above 3", (n, m), "it has no tail")
         scale = 2.0 * np.pi * density * self.parameters["strength"]

@@ -231,7 +231,7 @@ def test_hardly_any_particles(count, device):
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("wrapped", [False, True])
 def test_slots_follow_the_order_of_the_particles(axes, direction, wrapped):
-    # Layers of 8 x 8. A row of columns, each as wide as sixteen particles in a cube, 16^(1/3) = 2.5,
+    # Layers of 8 x 8. A row of columns, each as wide as sixteen particles in a cube, 16^(1/3) = 2.5
     # or up to 20/7 = 2.9 where whole columns fill the box, meets at most four of them: both
     # numberings part by less than four layers, while another order of the axes mixes all twenty.
     x = (np.indices((20, 8, 8)).reshape(3, -1).T + 0.5)[:, axes][::direction]

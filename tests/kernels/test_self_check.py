@@ -10,26 +10,24 @@ import pytest
 import particlesim as ps
 from particlesim.engine.execution.threads import Team
 from particlesim.engine.model import Model
-from particlesim.kernels import self_check
+from particlesim.kernels import native, self_check
 from particlesim.kernels.engine import packed, partners
 from particlesim.kernels.interactions import pair
-from particlesim.kernels.warp_internals import Packed
+from particlesim.kernels.warp_internals import Packed, elements
 
 
 def no_points(monkeypatch):
-    """A wrong result: nobody finds a partner."""
-    none = "__builtin_memset(hit, 0, sizeof(hit));"
-    monkeypatch.setattr(partners, "_hits", lambda *args: none)
+    """A wrong result: of each mask of hits the lanes are others."""
+    monkeypatch.setattr(partners, "_lanes", lambda mask: 0)
 
 
 def another_term(monkeypatch):
     """A wrong result: positions that lie in another order in memory."""
-    elements = packed.elements
 
     def shifted(array, c):
         return f"({elements(array, c)} + {int(array == 'd.x')})"
 
-    monkeypatch.setattr(packed, "elements", shifted)
+    monkeypatch.setattr(native, "elements", shifted)
 
 
 def no_such_name(monkeypatch):

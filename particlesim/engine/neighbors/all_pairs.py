@@ -39,7 +39,7 @@ class AllPairs:
         self.pairs.begin = model.array(self.begin_host, wp.int32)
         self.pairs.end = model.array(self.end_host, wp.int32)
         self.slots = model.array(np.arange(self.count), wp.int32)
-        self.rows: int | None = None  # of a pass over it: clusters of slots
+        self.rows = 0  # of a pass over it: clusters of slots
         self.users: list[str] = []
         # By world: whether it renews the list before interactions, and before constraints.
         self.for_interactions, self.for_constraints = np.zeros((2, model.world_count), dtype=bool)
@@ -63,7 +63,7 @@ class AllPairs:
 
     def allocate(self, state: State) -> None:
         """Make the arrays, once all requests are in."""
-        if self.rows is None:
+        if self.partners == ALL:
             size = CROWD if self.model.vectorised else 1
             worlds = zip(self.begin_host, self.end_host, strict=True)
             leads = [np.arange(begin, end, size) for begin, end in worlds]

@@ -10,9 +10,15 @@ import numpy as np
 import warp as wp
 
 from ...kernels.engine.clusters import SUPER, halving_kernels, supers_type
-from ...kernels.engine.columns import LINE, columns_kernels, columns_type
+from ...kernels.engine.columns import (
+    LINE,
+    columns_type,
+    lay_kernel,
+    number_kernel,
+    sort_kernel,
+)  # fmt: skip
 from ...kernels.engine.packed import AHEAD, CLUSTER
-from ...kernels.engine.partners import LEAST, Attic, partners_kernel
+from ...kernels.engine.partners import LEAST, Attic, attics_kernel, partners_kernel
 from ..execution.launch import call, launch, when
 from ..model import Model
 from .blocks import Block
@@ -153,7 +159,7 @@ class ClusterRows:
                  listed.order, self.planes],
                 device,
             )  # fmt: skip
-        launch(halve.attics, model.world_count, [listed.moved, self.attic.taken], device)
+        launch(attics_kernel(), model.world_count, [listed.moved, self.attic.taken], device)
         launch(
             halve.supers,
             self.super_count,
@@ -172,13 +178,13 @@ class ClusterRows:
         """Slots of a large block in the order of its columns."""
         listed, device = self.listed, self.model.device
         block, (grid, places) = listed.blocks[k], self.grids[k]
-        kernels = columns_kernels(self.model.precision)
-        launch(kernels.lay, 1, [k, self.model.box, listed.x_listed, self.columns], device)
+        precision = self.model.precision
+        launch(lay_kernel(precision), 1, [k, self.model.box, listed.x_listed, self.columns], device)
         inputs = [k, self.columns, listed.x_listed, self.bins, self.places]
-        launch(kernels.number, block.count, inputs, device)
+        launch(number_kernel(precision), block.count, inputs, device)
         call(functools.partial(grid.build, places, 1.0))
         launch(
-            kernels.sort,
+            sort_kernel(precision),
             block.count,
             [
                 grid.id,

@@ -54,8 +54,9 @@ class HashRows:
     def make_room(self, found: np.ndarray) -> int:
         """Rows for as many as were found, by slot, and more; returns how many entries.
 
-        Where they would have fitted, longer ones were full in an earlier substep. They are interleaved, so that neighbouring threads read neighbouring entries; those of
-        blocks by size are contiguous, as they are of very different lengths.
+        Where they would have fitted, longer ones were full in an earlier substep. They are
+        interleaved, so that neighbouring threads read neighbouring entries; those of blocks by size
+        are contiguous, as they are of very different lengths.
         """
         model, listed = self.model, self.listed
         longest = [found[a:b].max(initial=0) for a, b in itertools.pairwise(listed.edges)]

@@ -8,9 +8,6 @@ construction: a large world has hash grids of its own, one for each of its block
 
 from __future__ import annotations
 
-import itertools
-from typing import Any
-
 import numpy as np
 import warp as wp
 
@@ -18,7 +15,6 @@ from ... import validate
 from ...kernels.engine import neighbors as kernels
 from ...kernels.engine.clusters import SMALL
 from ...kernels.engine.loops import ROWS
-from ...kernels.engine.packed import AHEAD
 from ..execution.launch import call, launch, when
 from ..model import Model
 from ..state import State

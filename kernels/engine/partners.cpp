@@ -1,0 +1,197 @@
+// The rows of the clusters of super q, in world w. What stands before it (see partners.py) names the
+// numbers (real, SUPER slots of a super, CLUSTER of a cluster, CLUSTERS of a super, LEAST entries of
+// a row, RUNS at most, MARGIN of a cell, PERIODIC, LANES of each mask of eight) and the arrays.
+
+typedef unsigned char Bytes __attribute__((vector_size(8)));
+typedef int Ints __attribute__((vector_size(32)));
+
+const real *py = px + stride, *pz = py + stride;
+const int b = block_of[q], lead = leads[q];
+const int size = block_end[b] - lead < SUPER ? block_end[b] - lead : SUPER;
+const int c0 = cluster_of[q], clusters = (size + CLUSTER - 1) / CLUSTER;
+const int room = rooms[b];
+const real at[3] = {middle[q], middle[supers_n + q], middle[2 * supers_n + q]};
+const real reach[3] = {half[q], half[supers_n + q], half[2 * supers_n + q]};
+auto image = [&](real d, int n) __attribute__((always_inline)) -> real {
+    if (!PERIODIC[n]) return d;
+    return d - box.length[n] * __builtin_elementwise_rint(d * box.inverse[n]);
+};
+
+// Own slots in the image next to the middle; a cluster that lacks slots has its first once more.
+real own[3][SUPER];
+for (int k = 0; k < SUPER; ++k) {
+    const int first = k / CLUSTER * CLUSTER, s = lead + (k < size ? k : first < size ? first : 0);
+    for (int n = 0; n < 3; ++n) own[n][k] = at[n] + image(px[n * stride + s] - at[n], n);
+}
+
+int* out[CLUSTERS];
+int n[CLUSTERS] = {}, space[CLUSTERS], lost[LEAST];
+const long long attic_begin = attic_first[w], attic_end = attic_first[w + 1];
+for (int t = 0; t < clusters; ++t) {
+    row[c0 + t] = block_row[b] + (long long)room * (c0 + t - block_cluster[b]);
+    out[t] = index + row[c0 + t], space[t] = room;
+    for (int k = CLUSTER * t; k < size && k < CLUSTER * (t + 1); ++k) out[t][n[t]++] = lead + k;
+}
+// A row that is full goes on in the attic of its world, in twice the space.
+auto move = [&](int t) {
+    const int more = 2 * space[t];
+    const long long to = attic_begin + __atomic_fetch_add(taken + w, more, __ATOMIC_RELAXED);
+    if (to + more > attic_end) { out[t] = lost; return; }
+    __builtin_memcpy(index + to, out[t], sizeof(int) * n[t]);
+    out[t] = index + to, space[t] = more, row[c0 + t] = to;
+};
+
+unsigned char hit[CLUSTERS][SUPER];
+int run_a[RUNS], run_b[RUNS];
+for (int other = world_first[w]; other < world_first[w + 1]; ++other) {
+    const real R2 = reach_squared[b * blocks_n + other - world_first[w]];
+    if (__builtin_isinf(R2)) continue;  // nothing is looked for
+    const real R = (real)1.0001 * __builtin_elementwise_sqrt(R2);
+    const auto& g = layout[other];
+    const int s_first = super_first[other], s_end = super_first[other + 1];
+
+    // The supers that may be within R, as runs from run_a to run_b - 1 in rising order, none twice.
+    int runs = 0;
+    bool all = g.dims[0] == 0;
+    if (!all) {
+        int from[3], to[3];
+        real low[3], high[3];
+        for (int e = 0; e < 3; ++e) {
+            const int axis = g.axes[e];
+            low[e] = (at[axis] - reach[axis] - g.lower[e]) * g.scale[e] - MARGIN;
+            high[e] = (at[axis] + reach[axis] - g.lower[e]) * g.scale[e] + MARGIN;
+            const real lo = __builtin_elementwise_floor(low[e] - R * g.scale[e]);
+            const real hi = __builtin_elementwise_floor(high[e] + R * g.scale[e]), last = g.dims[e] - 1;
+            if (g.wraps[e]) {
+                const bool round = hi - lo >= last;
+                from[e] = round ? 0 : (int)lo, to[e] = round ? (int)last : (int)hi;
+                if (round) low[e] = -1e9, high[e] = 1e9;
+            } else {
+                from[e] = lo < 0 ? 0 : lo > last ? (int)last : (int)lo;
+                to[e] = hi < 0 ? 0 : hi > last ? (int)last : (int)hi;
+            }
+        }
+        auto cell = [&](int e, int k) {
+            const int cells = g.dims[e];
+            if (g.wraps[e]) k = ((k % cells) + cells) % cells;
+            return g.backward[e] ? cells - 1 - k : k;
+        };
+        auto away = [&](int e, int k) -> real {
+            // A cell at the edge of an open axis holds what is beyond it, too.
+            if (!g.wraps[e] && (k == 0 || k == g.dims[e] - 1)) return 0;
+            return (k > high[e] ? k - high[e] : k + 1 < low[e] ? low[e] - (k + 1) : 0) / g.scale[e];
+        };
+        auto add = [&](int column, int first, int last) {
+            const int cells = g.dims[0];
+            const bool turned = (g.backward[0] != 0) != ((column & 1) != 0);
+            const int* start = starts + g.first + column * cells;
+            const int A = start[turned ? cells - 1 - last : first];
+            const int B = start[(turned ? cells - 1 - first : last) + 1];
+            if (A == B) return;
+            if (runs == RUNS) { all = true; return; }
+            int k = runs++;
+            for (; k && run_a[k - 1] > A; --k) run_a[k] = run_a[k - 1], run_b[k] = run_b[k - 1];
+            run_a[k] = A, run_b[k] = B;
+        };
+        for (int z = from[2]; z <= to[2]; ++z) {
+            const real dz = away(2, z);
+            const int cz = cell(2, z);
+            for (int y = from[1]; y <= to[1]; ++y) {
+                const real dy = away(1, y), rest = R2 - dz * dz - dy * dy;
+                if (rest < 0) continue;
+                int cy = cell(1, y);
+                if (cz & 1) cy = g.dims[1] - 1 - cy;
+                const int column = cz * g.dims[1] + cy, cells = g.dims[0];
+                const real h = __builtin_elementwise_sqrt(rest) * g.scale[0];
+                const real lo = __builtin_elementwise_floor(low[0] - h);
+                const real hi = __builtin_elementwise_floor(high[0] + h);
+                if (!g.wraps[0]) {
+                    const int first = lo < 0 ? 0 : lo > cells - 1 ? cells - 1 : (int)lo;
+                    add(column, first, hi < 0 ? 0 : hi > cells - 1 ? cells - 1 : (int)hi);
+                } else if (hi - lo + 1 >= cells) {
+                    add(column, 0, cells - 1);
+                } else {
+                    const int first = (((int)lo % cells) + cells) % cells, last = first + (int)(hi - lo);
+                    add(column, first, last < cells ? last : cells - 1);
+                    if (last >= cells) add(column, 0, last - cells);
+                }
+            }
+        }
+        // Slots of a super are no longer in the order of their bins: whole supers.
+        int done = s_first;
+        for (int k = 0; k < runs; ++k) {
+            const int first = s_first + (run_a[k] - block_begin[other]) / SUPER;
+            run_a[k] = first < done ? done : first;
+            run_b[k] = s_first + (run_b[k] - 1 - block_begin[other]) / SUPER + 1;
+            done = run_b[k] > done ? run_b[k] : done;
+        }
+    }
+    if (all) runs = 1, run_a[0] = s_first, run_b[0] = s_end;
+
+    bool near = true;
+    for (int a = 0; a < 3; ++a)
+        if (PERIODIC[a]) near = near & (R + reach[a] < (real)0.4999 * box.length[a]);
+    for (int k = 0; k < runs; ++k)
+        for (int sp = run_a[k]; sp < run_b[k]; ++sp) {
+            real gap = 0;
+            for (int a = 0; a < 3; ++a) {
+                const real d = __builtin_elementwise_abs(image(middle[a * supers_n + sp] - at[a], a));
+                const real free = d - half[a * supers_n + sp] - reach[a];
+                gap += free > 0 ? free * free : 0;
+            }
+            if (gap > R * R) continue;
+            const int s = leads[sp];
+            // Which of its sixteen slots are within R of some slot of each cluster.
+            auto look = [&](auto kind) __attribute__((always_inline)) {
+#pragma clang fp contract(fast)
+                constexpr bool wide = decltype(kind)::wide;
+#pragma clang loop vectorize(enable)
+                for (int l = 0; l < SUPER; ++l) {
+                    real xj = px[s + l], yj = py[s + l], zj = pz[s + l];
+                    if (!wide) {
+                        xj = at[0] + image(xj - at[0], 0);
+                        yj = at[1] + image(yj - at[1], 1);
+                        zj = at[2] + image(zj - at[2], 2);
+                    }
+#pragma clang loop unroll(full)
+                    for (int t = 0; t < CLUSTERS; ++t) {
+                        real best = 0;
+#pragma clang loop unroll(full)
+                        for (int u = 0; u < CLUSTER; ++u) {
+                            const int k = CLUSTER * t + u;
+                            real dx = xj - own[0][k], dy = yj - own[1][k], dz = zj - own[2][k];
+                            if (wide) dx = image(dx, 0), dy = image(dy, 1), dz = image(dz, 2);
+                            const real r2 = dx * dx + dy * dy + dz * dz;
+                            best = u == 0 || r2 < best ? r2 : best;
+                        }
+                        hit[t][l] = best < R2;
+                    }
+                }
+            };
+            struct Near { enum { wide = 0 }; };
+            struct Wide { enum { wide = 1 }; };
+            if (near) look(Near()); else look(Wide());
+            const int there = block_end[other] - s < SUPER ? block_end[other] - s : SUPER;
+            for (int t = 0; t < clusters; ++t)
+                for (int h = 0; h < SUPER; h += 8) {
+                    unsigned long long word;
+                    __builtin_memcpy(&word, hit[t] + h, 8);
+                    unsigned mask = (word * 0x0102040810204080ull) >> 56;
+                    if (there - h < 8) mask &= there > h ? (1u << (there - h)) - 1 : 0;
+                    if (sp == q && CLUSTER * t / 8 * 8 == h) mask &= ~(0xfu << (CLUSTER * t % 8));
+                    if (!mask) continue;
+                    if (n[t] + LEAST > space[t] && out[t] != lost) move(t);
+                    // All eight are written, those behind the hits to be overwritten.
+                    Bytes chosen;
+                    __builtin_memcpy(&chosen, LANES + mask, sizeof(chosen));
+                    const Ints slots = __builtin_convertvector(chosen, Ints) + (s + h);
+                    __builtin_memcpy(out[t] == lost ? lost : out[t] + n[t], &slots, sizeof(slots));
+                    n[t] += __builtin_popcount(mask);
+                }
+        }
+}
+for (int t = 0; t < clusters; ++t) {
+    found[c0 + t] = n[t];
+    count[c0 + t] = out[t] == lost ? 0 : n[t];
+    if (out[t] == lost) overflowed[0] = 1;
+}
