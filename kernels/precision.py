@@ -242,8 +242,11 @@ def register(func: Callable[..., Any], cpu_only: bool = False, flags: str = "") 
     ``cpu_only`` ones hold C++ for the CPU's vector units or threads; CUDA never runs them.
     ``flags`` are for the CPU's compiler, beside those of all kernels.
     """
-    options = {"cpu_compiler_flags": f"{wp.config.cpu_compiler_flags} {flags}"} if flags else None
-    made = kernel(func, module_options=options)
+    options = {}
+    if flags:
+        all_flags = f"{wp.config.cpu_compiler_flags} {flags}"
+        options = {"module_options": {"cpu_compiler_flags": all_flags}}
+    made = kernel(func, **options)
     if not cpu_only:
         KERNELS.append(made)
     return made

@@ -63,8 +63,8 @@ def test_kernels_import_warp_and_themselves():
     known = {"warp", "numpy", f"{PACKAGE}.kernels"}
     standard = {
         "__future__", "abc", "ast", "collections", "contextlib", "contextvars", "ctypes",
-        "dataclasses", "functools", "hashlib", "inspect", "itertools", "linecache", "math", "pathlib",
-        "re", "textwrap", "threading", "types", "typing", "warnings",
+        "dataclasses", "functools", "hashlib", "inspect", "itertools", "linecache", "math",
+        "pathlib", "re", "textwrap", "threading", "types", "typing", "warnings",
     }  # fmt: skip
     for name in FILES:
         if room(name) == "kernels":

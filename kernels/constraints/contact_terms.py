@@ -71,7 +71,7 @@ def crowding_term(precision: Precision, params: Any, bounce: bool) -> Term:
         m = n * weight
         return six(m[0] * n[0], m[0] * n[1], m[0] * n[2], m[1] * n[1], m[1] * n[2], m[2] * n[2])
 
-    return Term(function(crowding), 6, rounding=None)
+    return Term(function(crowding), 6, rounding=None, placed=False)
 
 
 def largest_eigenvalue(precision: Precision) -> wp.Function:
@@ -142,7 +142,7 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> Term:
             result = result - t * wp.min(real(1.0) / split, limit)
         return four(result[0], result[1], result[2], lam * r)
 
-    return Term(function(push), 4, rounding=None)
+    return Term(function(push), 4, rounding=None, placed=False)
 
 
 def bounce_term(precision: Precision, params: Any) -> Term:
@@ -165,7 +165,7 @@ def bounce_term(precision: Precision, params: Any) -> Term:
         impulse = wp.where(hit, missing, real(0.0)) / wp.where(hit, share, real(1.0))
         return four(n[0] * impulse, n[1] * impulse, n[2] * impulse, impulse * r)
 
-    return Term(function(bounce), 4, rounding=None)
+    return Term(function(bounce), 4, rounding=None, placed=False)
 
 
 def store_share(precision: Precision, params: Any) -> wp.Function:

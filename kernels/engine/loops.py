@@ -51,14 +51,16 @@ class Term:
         function: ``(i, j, x_ij, r2, d, p)``, which gives a vector.
         width: Numbers of the sum.
         direction: Of unit length.
-        rounding: As the compiler may have it: products and sums in one, products with reciprocals
-            in place of quotients; and ``"any"`` order of sums and products, too. None: as written.
+        rounding: As the compiler may have it: a product and a sum in one; or ``"any"``, with
+            products of reciprocals in place of quotients, and in any order, too. None: as written.
+        placed: Its positions are places in the box, and not seen from somewhere.
     """
 
     function: wp.Function
     width: int
     direction: tuple[float, float, float] | None = None
     rounding: str | None = "fused"
+    placed: bool = True
 
     @property
     def returned(self) -> int:

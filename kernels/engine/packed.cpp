@@ -29,7 +29,7 @@ auto image = [&](real d, int n) __attribute__((always_inline)) -> real {
 // Own slots in the image next to the first one. Images go by that one where all that any of them
 // can see is within half a box of it; and where that is within the box, there are none.
 const int periodic = PERIODIC[0] | PERIODIC[1] | PERIODIC[2];
-bool near = LISTED | !periodic, inner = near;
+bool near = LISTED | !periodic, inner = near & PLACED;
 for (int u = 0; u < SIZE; ++u) {
     const int s = a + (u < own ? u : own - 1);
     for (int n = 0; n < 3; ++n) b[n][u] = x[3 * s + n];
@@ -87,8 +87,10 @@ for (int tile = 0; tile < partners; tile += TILE) {
                     const real d = b[n][k] - b[n][0];
                     b[n][k] -= box.length[n] * __builtin_elementwise_rint(d * box.inverse[n]);
                 }
-    // Behind the last: so far that the square is infinite, and 0 times it is 0.
-    for (int k = OFF + m; k < OFF + top; ++k) b[0][k] = FAR, b[1][k] = b[2][k] = 0;
+    // Behind the last: so far that the square is infinite, and 0 times it is 0. Images of that would
+    // be no numbers; where there are any, lanes are counted.
+    for (int k = OFF + m; k < OFF + top; ++k)
+        for (int n = 0; n < 3; ++n) b[n][k] = (near && n == 0) ? FAR : b[n][0];
 #pragma clang loop vectorize(disable)
     for (int k = 0; k < top; ++k) { COPY(OFF + k, id[k]) }
 

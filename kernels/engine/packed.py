@@ -24,12 +24,12 @@ CLUSTER = 4  # slots of a cluster of a list
 CROWD = 16  # slots of a cluster that looks at its whole world
 TILE = 256  # partners that are copied at a time
 AHEAD = 16  # entries beyond the end of all rows that are read
-# Flags of the compiler by how a term may be rounded, with what it takes to sum a Lennard-Jones
-# liquid in float32: 80 ns a particle as written, 61 fused. A derived energy takes 95, 81 and in any
-# order 60. They stay away from compensated sums, and from laws that are given in an order that
-# keeps them in range.
-FUSED = "-ffp-contract=fast -freciprocal-math -fno-signed-zeros"
-FLAGS = {None: "", "fused": FUSED, "any": f"{FUSED} -mreassociate"}
+# Flags of the compiler by how a term may be rounded, with what it takes: the forces of a liquid in
+# float32, ns a particle, of Lennard-Jones and of an energy law that is derived. As written 63 and
+# 95, fused 50 and 82, in any order 49 and 64. They stay away from compensated sums; the last also
+# from laws that are given, perhaps in an order that keeps them in range.
+FUSED = "-ffp-contract=fast -fno-signed-zeros"
+FLAGS = {None: "", "fused": FUSED, "any": f"{FUSED} -freciprocal-math -mreassociate"}
 LANES = {"float": 16, "double": 8}
 FAR = {"float": "1e30f", "double": "1e200"}
 
@@ -76,6 +76,7 @@ def _numbers(
     return {
         "W": lanes, "OFF": CROWD, "TILE": TILE, "SIZE": CLUSTER if listed else CROWD,
         "WIDTH": term.width, "CENTRAL": term.direction is not None, "LISTED": listed,
+        "PLACED": term.placed,
         "AT_ONCE": 4 if term.width <= 4 else 2,  # what registers hold
         "PERIODIC": [int(on) for on in periodic],
         "lane": list(range(lanes)),  # as wide as numbers, which a loop's counter is not

@@ -23,7 +23,8 @@ _SEPARATION = """
 _ALONG = "    along = x_ij + aside * wp.where(apart, real(0.0), side * r)\n"
 
 
-SQUARED = "distance_squared"  # a potential whose first argument is called so takes r^2
+# A potential whose first argument is called so takes r^2, and so does a force, to give F / r.
+SQUARED = "distance_squared"
 
 
 def _of_distance(law: wp.Function, arguments: list[str]) -> tuple[str, bool]:
@@ -42,21 +43,23 @@ def _derived(law: wp.Function, arguments: list[str]) -> tuple[str, str]:
 
 def force_term(
     law: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any,
-    derivative: bool,
+    derivative: bool, rounding: str,
 ) -> Term:  # fmt: skip
     """Term f_ij = F(r) x_ij / r, with F the law itself or minus the derivative of an energy.
 
-    ``arguments`` are the source of the law's arguments after ``r``, in terms of i, j, d and p.
+    ``arguments`` are the source of the law's arguments after ``r``, in terms of i, j, d and p;
+    ``rounding`` is how the compiler may have it.
     """
     if derivative:
         evaluate, w = _derived(law, arguments)
     else:
-        evaluate, w = "", f"{_of_distance(law, arguments)[0]} / r"
+        call, squared = _of_distance(law, arguments)
+        evaluate, w = "", call if squared else f"{call} / r"
     evaluate += f"    w = {w}"
     result = "pair2(w, wp.where(apart, real(0.0), side * w * r))"
     names_of = {"law": law, "pair2": precision.vector(2)}
     made = _term("pair_force", evaluate, result, names_of, precision, data, params)
-    return Term(made, 3, APART, "any" if derivative else "fused")
+    return Term(made, 3, APART, rounding)
 
 
 def measure_term(
@@ -75,7 +78,8 @@ def virial_term(
     force: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any
 ) -> Term:
     """Term (0, r F / 2) of a force that is given."""
-    result = "pair2(real(0.0), real(0.5) * r * f)"
+    squared = _of_distance(force, arguments)[1]
+    result = f"pair2(real(0.0), real(0.5) * {'square' if squared else 'r'} * f)"
     return _plain_term("pair_virial", force, arguments, result, precision, data, params)
 
 
@@ -209,7 +213,7 @@ def _packed_kernel(term, store, data, params, out, precision, periodic, partners
     loop = packed_loop(term, store, data, params, out, precision, periodic, partners)
 
     @functools.partial(register, cpu_only=True, flags=FLAGS[term.rounding])
-    def sum_over_packed(
+    def sum_over_partners(
         first: int,
         pairs: Pairs,
         box: wp.array(dtype=Box),
@@ -221,7 +225,7 @@ def _packed_kernel(term, store, data, params, out, precision, periodic, partners
         w = pairs.world[pairs.lead[c]]
         loop(c, pairs, box[w], d, parameters[w], o)
 
-    return sum_over_packed
+    return sum_over_partners
 
 
 @functools.cache

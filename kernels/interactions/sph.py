@@ -43,7 +43,7 @@ def density_term(weight: wp.Function, precision: Precision, data: Any, params: A
     def add_density(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
         return one(read(d.m, j) * weight(wp.sqrt(r2) * p.inverse_h))
 
-    return Term(function(add_density), 1)
+    return Term(function(add_density), 1, rounding="fused")
 
 
 @functools.cache
@@ -101,7 +101,7 @@ def force_term(
         w = (-gradient * stress * p.inverse_h) * p.inverse_h
         return pair2(w, wp.where(apart, real(0.0), side * w))
 
-    return Term(function(push), 3, DIRECTIONS[dimension])
+    return Term(function(push), 3, DIRECTIONS[dimension], "fused")
 
 
 def virial_term(force: Term, precision: Precision, data: Any, params: Any) -> Term:

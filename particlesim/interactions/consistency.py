@@ -103,7 +103,7 @@ def _of_box(part: Any, pairs: dict[str, np.ndarray], count: int) -> str:
     arguments = part.arguments[-1]
 
     def force(r: float) -> float:
-        f = of_pairs(arguments, np.full(TRIES, r), pairs, derived=part.force is None)
+        f = of_pairs(arguments, np.full(TRIES, r), pairs, force=True, derived=part.force is None)
         return float(np.abs(f[np.isfinite(f)]).max(initial=0.0))
 
     there, here = force(half), force(near)
@@ -115,6 +115,17 @@ def _of_box(part: Any, pairs: dict[str, np.ndarray], count: int) -> str:
         f"force at {near:.3g} left at {half:.3g}; lengthen the box, leave its axes open, or give a "
         "law with a cutoff."
     )
+
+
+def is_ordinary(part: Any) -> bool:
+    """Whether products of what the law of a ``Pair`` takes stay in range in any order."""
+    model, arguments = part.model, part.arguments[-1]
+    members = np.unique(part.pairs.members_host)
+    taken = [quantity(model, members, name) for name in arguments.quantities - {"position"}]
+    lengths = [each[each > 0] for each in model.apart()]
+    if part.cutoff is not None:
+        lengths.append(np.array([peer.cutoff for peer in part.peers]))
+    return not _extraordinary(model, [*lengths, *taken, *arguments.values.values()])
 
 
 def _of_pair_range(
@@ -129,7 +140,7 @@ def _of_pair_range(
     if not r.all() or not _extraordinary(model, [r, *pairs.values(), *arguments.values.values()]):
         return ""
     kept, true = (
-        of_pairs(arguments, r, pairs, derived=part.force is None, precision=each)
+        of_pairs(arguments, r, pairs, force=True, derived=part.force is None, precision=each)
         for each in (model.precision, FLOAT64)
     )
     return _lost(part, arguments, kept, true)

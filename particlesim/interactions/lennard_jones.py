@@ -54,16 +54,17 @@ def _laws(n: int, m: int) -> tuple[Law, Law]:
 
     @law
     def mie_force(r: float, strength: float, sigma: float, u_cut: float, f_cut: float, cut: float):
-        repulsion = power_n(sigma / r)
-        attraction = power_m(sigma / r)
-        return strength * (float(n) * repulsion - float(m) * attraction) / r - f_cut
+        inverse = 1.0 / r
+        repulsion = power_n(sigma * inverse)
+        attraction = power_m(sigma * inverse)
+        return strength * (float(n) * repulsion - float(m) * attraction) * inverse - f_cut
 
     return mie_potential, mie_force
 
 
 @functools.cache
-def _even_potential(n: int, m: int) -> Law:
-    """Potential of the Mie family for even exponents, by the square of the distance."""
+def _even_laws(n: int, m: int) -> tuple[Law, Law]:
+    """The same for even exponents, by the square of the distance: potential, and force over r."""
     power_n, power_m = _power(n // 2), _power(m // 2)
 
     @law
@@ -71,7 +72,13 @@ def _even_potential(n: int, m: int) -> Law:
         s = sigma * sigma / distance_squared
         return strength * (power_n(s) - power_m(s)) - u_cut
 
-    return mie_squared
+    @law
+    def mie_force_over_r(distance_squared: float, strength: float, sigma: float, u_cut: float):
+        inverse = 1.0 / distance_squared
+        s = sigma * sigma * inverse
+        return strength * (float(n) * power_n(s) - float(m) * power_m(s)) * inverse
+
+    return mie_squared, mie_force_over_r
 
 
 class LennardJones(Pair):
@@ -121,7 +128,7 @@ class LennardJones(Pair):
         f_cut = strength * (n * s**n - m * s**m) / cut if truncation == "force_shift" else 0.0
         parameters = {"strength": strength, "sigma": sigma, "u_cut": u_cut}
         even = n % 2 == 0 and m % 2 == 0 and truncation != "force_shift"
-        laws: tuple[Law, Law | None] = (_even_potential(n, m), None) if even else _laws(n, m)
+        laws = _even_laws(n, m) if even else _laws(n, m)
         if not even:
             parameters |= {"f_cut": f_cut, "cut": cut}
         super().__init__(*laws, group, cut, parameters)

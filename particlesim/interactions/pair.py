@@ -22,7 +22,7 @@ from ..scene.law import Law
 from ..scene.law import law as make_law
 from ..scene.part import Interaction
 from .arguments import Arguments
-from .consistency import of_pair_force
+from .consistency import is_ordinary, of_pair_force
 from .exchange import is_symmetric, named
 from .pair_limits import collisions
 from .pair_loop import PairLoop, check_names, squared_distances
@@ -64,11 +64,6 @@ class Pair(Interaction):
                 raise validate.fail(
                     self.name, "law", "take the distance r as its first parameter", each.name,
                     "write def law(r, ...)",
-                )  # fmt: skip
-            if each is force and next(iter(each.parameters)) == kernels.SQUARED:
-                raise validate.fail(
-                    self.name, f"law {each.name}", "take the distance r as its first parameter",
-                    kernels.SQUARED, "write def law(r, ...); a potential may take the square",
                 )  # fmt: skip
             check_names(self.name, each)
             if "cutoff" in each.parameters and self.cutoff is not None:
@@ -116,7 +111,9 @@ class Pair(Interaction):
     def attach(self, model: Model, state: State) -> None:
         fields = self.fields_of(self.pairs)
         self.loop = PairLoop.over(model, self.pairs, "Pair", fields, self.Params, self.params)
-        self.term = self._term(kernels.force_term, -1, derivative=self.force is None)
+        derived = self.force is None
+        rounding = "any" if derived and is_ordinary(self) else "fused"
+        self.term = self._term(kernels.force_term, -1, derivative=derived, rounding=rounding)
 
     @property
     def reciprocal(self) -> bool:
@@ -141,7 +138,7 @@ class Pair(Interaction):
         own = {name: pairs.fields[name] for name in self.quantities if name != "position"}
         return {"x": pairs.fields["position"], **own}
 
-    def _term(self, make: Callable[..., Term], k: int, **options: bool) -> Term:
+    def _term(self, make: Callable[..., Term], k: int, **options: Any) -> Term:
         """A term of the k-th law."""
         precision = self.model.precision
         arguments = self.arguments[k].source({"_i": "i", "_j": "j"})
@@ -207,7 +204,8 @@ class PairPotential(Pair):
 class PairForce(Pair):
     """Pair force F(r) along the pair, given directly; positive repels.
 
-    Arguments as for :class:`PairPotential`. No energy is reported. A law that is another with i and
+    A law whose first parameter is called ``distance_squared`` gets r^2 and gives F / r, which saves
+    a root and a quotient. Arguments as for :class:`PairPotential`. No energy is reported. A law that is another with i and
     j exchanged, as ``charge_i * mass_j`` is, gives forces that are not opposite: i feels F of (i,
     j), j feels F of (j, i), and momentum is not kept. A warning says so, once for each law.
 

@@ -52,7 +52,7 @@ def quantity(model: Model, rows: np.ndarray, name: str) -> np.ndarray:
 
 def of_pairs(
     arguments: Arguments, r: np.ndarray, pairs: Mapping[str, np.ndarray], *, order: str = "ij",
-    derived: bool = False, precision: Precision = FLOAT64,
+    force: bool = False, derived: bool = False, precision: Precision = FLOAT64,
 ) -> np.ndarray:  # fmt: skip
     """A pair's law at distances r, or minus its derivative: the force of a potential.
 
@@ -61,6 +61,7 @@ def of_pairs(
         r: (k,) [length].
         pairs: Quantities of both by name, (k, 2) or (k, 2, 3).
         order: What the first and the second particle are called.
+        force: It is the law of a force, if it is not derived.
         derived: By the distance.
         precision: In which it is computed.
     """
@@ -72,7 +73,9 @@ def of_pairs(
             given[name] = pairs[source][:, order.index(kind[-1])]
     by = distance if derived else None
     found = values(arguments, given, len(r), by=by, precision=precision)
-    return (-2.0 * r if squared else -1.0) * found if derived else found
+    if derived:
+        return (-2.0 * r if squared else -1.0) * found
+    return r * found if squared and force else found
 
 
 def of_particles(

@@ -44,8 +44,8 @@ def healthy(kind, device, frames):
 def test_one_world_of_256_explodes_and_the_others_never_notice(kind, healing, device, monkeypatch):
     if kind == "grid":
         # Every world, of 27 atoms, then has a hash grid of its own.
-        monkeypatch.setattr(verlet, "DIRECT_CPU", 8)
-        monkeypatch.setattr(verlet, "DIRECT_CUDA", 8)
+        monkeypatch.setattr(verlet, "SMALL", 8)
+        monkeypatch.setattr(verlet, "DIRECT", 8)
     on_failure = "freeze" if healing == "freeze" else "stop"
     settings = ps.Settings(dt=0.01, substeps=2, on_failure=on_failure)
     sim = ps.Simulation(crowd(sick=True), settings, device=device)

@@ -163,7 +163,8 @@ def test_what_is_wild_where_it_is_asked_stays_so():
     scene.add_interaction(ps.PairPotential(edge, cutoff=2.0))
     sim = ps.Simulation(scene, device="cpu")
     sim.forces(0.0)
-    assert np.isinf(sim.get("force")[:, 0]).all()
+    # Infinite, or where products are taken in another order no number: nothing passes for a force.
+    assert not np.isfinite(sim.get("force")[:, 0]).any()
 
 
 def test_lines_of_errors_are_found_behind_what_was_moved(refused):

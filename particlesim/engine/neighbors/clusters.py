@@ -206,7 +206,7 @@ class ClusterRows:
             return f"clusters of {CLUSTER}"
         dims = self.columns.numpy()["dims"][self.large[0]]
         more = f" and {len(self.large) - 1} more" if len(self.large) > 1 else ""
-        return f"clusters of {CLUSTER}, columns {dims[1]} x {dims[2]} of {dims[0]} bins{more}"
+        return f"clusters of {CLUSTER}, hash grid {dims[1]} x {dims[2]} columns of {dims[0]}{more}"
 
     @property
     def arrays(self) -> list[wp.array]:

@@ -115,6 +115,11 @@ class VerletList(AllPairs):
         return float(self.pairs.count.numpy() @ self.of_cluster)
 
     @property
+    def grids(self) -> dict[int, Any]:
+        """Hash grids, by block; small worlds have none."""
+        return self.layout.grids
+
+    @property
     def capacity(self) -> int:
         """Neighbours that the longest rows have room for."""
         return int(self.layout.room.max())
