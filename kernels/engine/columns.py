@@ -100,6 +100,10 @@ def lay_kernel(precision: Precision) -> wp.Kernel:
             spread[a] = wp.sqrt(real(12.0) * wp.max(square[b] / count - m * m, real(0.0)))
             length[a] = wp.where(c.wraps[a] != 0, box[c.world].length[b], high[b] - low[b])
             lower[a] = wp.where(c.wraps[a] != 0, box[c.world].lower[b], low[b])
+            if not wp.isfinite(length[a] + spread[a]):  # whatever is, it ends somewhere
+                length[a] = real(0.0)
+                spread[a] = real(0.0)
+                lower[a] = real(0.0)
         side = side_of(spread, count, wp.max(length))
         n = dims_of(length, side, c)
         while real(n[0]) * real(n[1]) * real(n[2]) > real(c.most):

@@ -10,7 +10,7 @@ for (int a = 0; a < 3; ++a)
     for (int k = 0; k < n; ++k) {
         real d = planes[a][k] - planes[a][0];
         if (PERIODIC[a]) d -= box.length[a] * __builtin_elementwise_rint(d * box.inverse[a]);
-        v[a][k] = d;
+        v[a][k] = d == d ? d : 0;  // what is no number has no order
     }
 for (int k = 0; k < n; ++k) from[k] = k;
 int todo[64], size[64], left = 1;

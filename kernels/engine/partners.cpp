@@ -53,6 +53,7 @@ for (int other = world_first[w]; other < world_first[w + 1]; ++other) {
     // The supers that may be within R, as runs from run_a to run_b - 1 in rising order, none twice.
     int runs = 0;
     bool all = g.dims[0] == 0;
+    for (int a = 0; a < 3; ++a) all = all | !(at[a] - at[a] == 0) | !(reach[a] - reach[a] == 0);
     if (!all) {
         int from[3], to[3];
         real low[3], high[3];
