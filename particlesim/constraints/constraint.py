@@ -19,6 +19,7 @@ from ..engine.probe import Probe
 from ..engine.state import State
 from ..kernels.constraints import constraints as kernels
 from ..kernels.constraints.constraint_force import virial_kernel
+from ..kernels.constraints.projection import BLOCK, project_kernel
 from ..scene.law import law as make_law
 from ..scene.part import ConstraintBase, Part
 from .force import ConstraintForce
@@ -194,14 +195,13 @@ class Constraint(ConstraintBase):
     def attach(self, model: Model, state: State) -> None:
         if not self.count:
             return
-        self.struct = self.tuples.struct(
-            inequality=self.inequality, breakable=self.break_force is not None
-        )
+        self.struct = self.tuples.struct()
         self.bodies = bodies(model, state)
         self.scale = wp.zeros(1, dtype=wp.float64, device=model.device)
         self.strain = wp.zeros_like(self.struct.lam)
         solved = self.tuples.solved(self, state)
-        self.project_kernel = kernels.project_kernel(solved)
+        self.project_kernel = project_kernel(solved, model.vectorised)
+        self.block = BLOCK if model.vectorised else 1
         self.strain_kernel = kernels.strain_kernel(solved)
         self.virial_kernel = virial_kernel(solved)
 
@@ -216,9 +216,10 @@ class Constraint(ConstraintBase):
             return
         # Static projection: no time passes, and nothing moves of itself.
         own = 0.0 if math.isinf(dt) else dt
-        for start, rows in self.tuples.spans:
-            inputs = [start, self.model.box, self.struct, self.bodies, own, 1.0 / dt]
-            launch(self.project_kernel, rows, inputs, self.model.device)
+        for start, end in self.tuples.spans:
+            inputs = [start, end, self.model.box, self.struct, self.bodies, own, 1.0 / dt]
+            blocks = -(-(end - start) // self.block)
+            launch(self.project_kernel, blocks, inputs, self.model.device, rows=self.block)
 
     def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if self.count and self.break_force is not None:

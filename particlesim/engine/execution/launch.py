@@ -36,6 +36,7 @@ class Launch:
     inputs: Sequence[Any]
     device: Any
     owner: str = ""
+    rows: int = 1  # that a thread makes
 
     def issue(self) -> None:
         wp.launch(self.kernel, self.dim, [0, *self.inputs], device=self.device)
@@ -47,7 +48,7 @@ class Launch:
             chunks: How many at most.
             least: Rows of a chunk.
         """
-        pieces = max(1, min(chunks, self.dim // least))
+        pieces = max(1, min(chunks, self.dim, self.dim * self.rows // least))
         edges = [self.dim * k // pieces for k in range(pieces + 1)]
         return [
             wp.launch(
@@ -138,7 +139,8 @@ class _Recorder:
         rows = math.prod(dim) if isinstance(dim, Sequence) else int(dim)
         device = arguments.get("device")
         inputs = [*arguments.get("inputs", ()), *arguments.get("outputs", ())]
-        _now().add(Whole(arguments["kernel"], rows, inputs, device, _owner.get(), arguments))
+        given = arguments["kernel"], rows, inputs, device, _owner.get()
+        _now().add(Whole(*given, arguments=arguments))
 
     def call(self, run: Callable[[], None]) -> None:
         _now().add(Call(run))
@@ -195,7 +197,7 @@ def owner(name: str) -> Iterator[None]:
         yield
 
 
-def launch(kernel: Any, dim: int, inputs: Sequence[Any], device: Any) -> None:
+def launch(kernel: Any, dim: int, inputs: Sequence[Any], device: Any, rows: int = 1) -> None:
     """Launch a kernel over ``dim`` rows: now, or each time that what is being recorded is run.
 
     This is how an interaction, a constraint or an integrator of your own runs a kernel in its
@@ -218,6 +220,7 @@ def launch(kernel: Any, dim: int, inputs: Sequence[Any], device: Any) -> None:
         dim: Rows; nothing happens for 0.
         inputs: What the kernel takes after ``first``: arrays, structs, numbers.
         device: Where the arrays are: ``model.device``.
+        rows: How many a thread makes, of a kernel whose rows are blocks of them.
 
     Example:
         >>> @wp.kernel
@@ -234,7 +237,7 @@ def launch(kernel: Any, dim: int, inputs: Sequence[Any], device: Any) -> None:
         if program is not None:
             program.touched = True
         return
-    operation = Launch(kernel, dim, inputs, device, _owner.get())
+    operation = Launch(kernel, dim, inputs, device, _owner.get(), rows)
     if program is not None:
         program.add(operation)
     else:
@@ -275,7 +278,8 @@ class Frame:
     @property
     def largest(self) -> int:
         """Rows of the largest launch."""
-        return max((each.dim for part in self.parts for each in part.launches()), default=0)
+        launches = [each for part in self.parts for each in part.launches()]
+        return max((each.dim * each.rows for each in launches), default=0)
 
     @property
     def parts(self) -> tuple[Program, Program, Program]:
