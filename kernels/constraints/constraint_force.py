@@ -126,7 +126,6 @@ def virial_kernel(law: Solved) -> wp.Kernel:
         box: wp.array(dtype=Box),
         t: Tuples,
         b: Bodies,
-        scale: wp.array(dtype=wp.float64),
         energy_io: wp.array(dtype=wp.float64),
         virial_io: wp.array(dtype=wp.float64),
     ):
@@ -138,7 +137,7 @@ def virial_kernel(law: Solved) -> wp.Kernel:
             X, C, G = view(r, box, t, b)
             C = counted(C, r, t)
             alpha = wp.float64(t.item[r].compliance)
-            F = wp.float64(t.lam[r]) * scale[0] * wp.float64(b.unit)
+            F = wp.float64(t.lam[r]) * t.scale[0] * wp.float64(b.unit)
             if alpha > wp.float64(0.0) and C != real(0.0):
                 twice = wp.float64(C) * wp.float64(C) / alpha
                 if F != wp.float64(0.0):

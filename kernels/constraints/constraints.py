@@ -69,6 +69,7 @@ def tuples_type(precision: Precision, size: int, item: Any) -> Any:
         "world": wp.array(dtype=wp.int32),
         "item": wp.array(dtype=item),
         "lam": wp.array(dtype=precision.scalar),
+        "scale": wp.array(dtype=wp.float64),  # 1 / dt^2 of the substep that made them
         "broken": wp.array(dtype=wp.int32),  # empty where nothing can break
     }
     return structure(f"Tuples{size}_{precision.name}", fields)
@@ -94,7 +95,7 @@ def rounding_function(precision: Precision, compensated: bool) -> wp.Function:
 
 def shift_function(precision: Precision, compensated: bool) -> wp.Function:
     """``shift(x, e, c, dx) -> (x, e, c)``: x on by dx, its rounding error, all corrections."""
-    vec3, add = precision.vec3, compensated_sum(precision)
+    vec3, add = precision.vec3, compensated_sum(precision.vec3)
 
     def shift(x: vec3, e: vec3, c: vec3, dx: vec3):
         total = x + dx
@@ -218,26 +219,6 @@ def view_function(law: Solved) -> wp.Function:
 
 
 @functools.cache
-def reset_kernel(precision: Precision) -> wp.Kernel:
-    """Kernel: multipliers to zero as a substep starts, and its time scale kept for reports."""
-    real = precision.scalar
-
-    @register
-    def reset_multipliers(
-        first: int,
-        inverse_dt: wp.float64,
-        lam_out: wp.array(dtype=real),
-        scale_out: wp.array(dtype=wp.float64),
-    ):
-        r = first + wp.tid()
-        lam_out[r] = real(0.0)
-        if r == 0:
-            scale_out[0] = inverse_dt * inverse_dt
-
-    return reset_multipliers
-
-
-@functools.cache
 def strain_kernel(law: Solved) -> wp.Kernel:
     """Kernel: force of each tuple, |lam| max_a |grad_a C| / dt^2; what exceeds its limit breaks."""
     real, Box, Tuples, Bodies = law.types
@@ -250,7 +231,6 @@ def strain_kernel(law: Solved) -> wp.Kernel:
         box: wp.array(dtype=Box),
         t: Tuples,
         b: Bodies,
-        scale: wp.array(dtype=wp.float64),
         force_out: wp.array(dtype=real),
     ):
         r = first + wp.tid()
@@ -258,7 +238,7 @@ def strain_kernel(law: Solved) -> wp.Kernel:
         steepest = real(0.0)
         for a in range(wp.static(size)):
             steepest = wp.max(steepest, wp.length(G[a]))
-        force = real(wp.float64(wp.abs(t.lam[r]) * steepest) * scale[0] * wp.float64(b.unit))
+        force = real(wp.float64(wp.abs(t.lam[r]) * steepest) * t.scale[0] * wp.float64(b.unit))
         force_out[r] = force
         if wp.static(breakable):
             if may_break != 0 and force > t.item[r].break_force:

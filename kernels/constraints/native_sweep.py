@@ -21,7 +21,7 @@ def group(law: Solved) -> int:
 
 
 def native_sweep(law: Solved) -> wp.Function:
-    """``sweep(first, last, box, t, b, dt, inverse_dt)`` of whole groups, as ``plain_sweep`` goes.
+    """The same as ``plain_sweep``, of whole groups of tuples.
 
     Rows come to planes, a group of tuples is corrected at once, and planes go back to rows.
     """
@@ -68,8 +68,8 @@ def native_sweep(law: Solved) -> wp.Function:
 """
 
     def sweep_natively(
-        first: int, last: int, box: wp.array(dtype=Box), t: Tuples, b: Bodies, dt: real,
-        inverse_dt: real,
+        first: int, last: int, fresh: int, box: wp.array(dtype=Box), t: Tuples, b: Bodies,
+        dt: real, inverse_dt: real,
     ):  # fmt: skip
         p = positions()
         q = t.item[first]
@@ -125,12 +125,13 @@ def _lane_loops(law: Solved, moved: Iterable[str], read: Iterable[str]) -> str:
             {matrix(size, 3, c)} G, c, v;
             {vector(size, c)} w, s;
             Item q;
+            const {c} lam_old = fresh ? 0 : lam[l];
             {c} lam_new;
             bool good;
             {_copied(known)}
-            {multiply}(C_of[l], G, c, v, w, lam[l], q, b.unit, b.most, dt, inverse_dt,
+            {multiply}(C_of[l], G, c, v, w, lam_old, q, b.unit, b.most, dt, inverse_dt,
                 lam_new, good, s);
-            lam_of[l] = good ? lam_new : lam[l];
+            lam_of[l] = good ? lam_new : lam_old;
             {" ".join(_moved(law, moved, a) for a in range(size))}
         }}
 """

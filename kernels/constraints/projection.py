@@ -19,7 +19,10 @@ BLOCK = 64  # tuples that a thread of the CPU sweeps
 
 
 def plain_sweep(law: Solved) -> wp.Function:
-    """The sweep in Warp's own language: ``sweep(first, last, box, t, b, dt, inverse_dt)``."""
+    """``sweep(first, last, fresh, box, t, b, dt, inverse_dt)``: rows from first to last.
+
+    In Warp's own language. ``fresh``: multipliers start from 0, whatever they were.
+    """
     real, Box, Tuples, Bodies = law.types
     size, evaluate, multiply = law.size, evaluate_function(law), multiply_function(law)
     positions, weights = positions_type(law.precision, law.size), law.precision.vector(law.size)
@@ -28,10 +31,12 @@ def plain_sweep(law: Solved) -> wp.Function:
     damped, breakable = law.damped, law.breakable
 
     def sweep_plainly(
-        first: int, last: int, box: wp.array(dtype=Box), t: Tuples, b: Bodies, dt: real,
-        inverse_dt: real,
+        first: int, last: int, fresh: int, box: wp.array(dtype=Box), t: Tuples, b: Bodies,
+        dt: real, inverse_dt: real,
     ):  # fmt: skip
         for r in range(first, last):
+            if fresh != 0:
+                t.lam[r] = real(0.0)
             if wp.static(breakable):
                 if t.broken[r] != 0:
                     continue
@@ -69,12 +74,12 @@ def lane_sweep(law: Solved) -> wp.Function:
     natively, plainly, size = native_sweep(law), plain_sweep(law), group(law)
 
     def sweep_in_lanes(
-        first: int, last: int, box: wp.array(dtype=Box), t: Tuples, b: Bodies, dt: real,
-        inverse_dt: real,
+        first: int, last: int, fresh: int, box: wp.array(dtype=Box), t: Tuples, b: Bodies,
+        dt: real, inverse_dt: real,
     ):  # fmt: skip
         whole = last - (last - first) % wp.static(size)
-        natively(first, whole, box, t, b, dt, inverse_dt)
-        plainly(whole, last, box, t, b, dt, inverse_dt)
+        natively(first, whole, fresh, box, t, b, dt, inverse_dt)
+        plainly(whole, last, fresh, box, t, b, dt, inverse_dt)
 
     return function(sweep_in_lanes, after_gradients=True)
 
@@ -83,7 +88,8 @@ def lane_sweep(law: Solved) -> wp.Function:
 def project_kernel(law: Solved, vectorised: bool) -> wp.Kernel:
     """Kernel: one sweep over the tuples of a colour, those from ``start`` to ``end``.
 
-    A thread sweeps ``BLOCK`` of them where it is vectorised, else one.
+    A thread sweeps ``BLOCK`` of them where it is vectorised, else one. The first sweep of a substep
+    starts from multipliers of 0, and has ``scale`` = 1 / dt^2 kept for reports; else it is below 0.
     """
     real, Box, Tuples, Bodies = law.types
     sweep = (lane_sweep if vectorised else plain_sweep)(law)
@@ -94,6 +100,7 @@ def project_kernel(law: Solved, vectorised: bool) -> wp.Kernel:
         first: int,
         start: int,
         end: int,
+        scale: wp.float64,
         box: wp.array(dtype=Box),
         t: Tuples,
         b: Bodies,
@@ -101,6 +108,9 @@ def project_kernel(law: Solved, vectorised: bool) -> wp.Kernel:
         inverse_dt: real,
     ):
         r = start + (first + wp.tid()) * wp.static(block)
-        sweep(r, wp.min(r + wp.static(block), end), box, t, b, dt, inverse_dt)
+        fresh = int(scale >= wp.float64(0.0))
+        if fresh != 0 and r == 0:
+            t.scale[0] = scale
+        sweep(r, wp.min(r + wp.static(block), end), fresh, box, t, b, dt, inverse_dt)
 
     return project_tuples

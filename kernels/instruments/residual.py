@@ -48,7 +48,6 @@ def off_kernel(law: Solved) -> wp.Kernel:
         box: wp.array(dtype=Box),
         t: Tuples,
         b: Bodies,
-        scale: wp.array(dtype=wp.float64),
         off_out: wp.array(dtype=real),
     ):
         r = first + wp.tid()
@@ -61,7 +60,7 @@ def off_kernel(law: Solved) -> wp.Kernel:
             extent = wp.max(extent, wp.length(X[a] - X[0]))
             slope = slope + wp.length_sq(G[a])
             rate = rate + wp.dot(G[a], b.v[t.particle[r][a]])
-        F = wp.float64(t.lam[r]) * scale[0] * wp.float64(b.unit)
+        F = wp.float64(t.lam[r]) * t.scale[0] * wp.float64(b.unit)
         if wp.static(damped):
             F = F + wp.float64(q.damping) * wp.float64(rate)
         miss = wp.abs(wp.float64(C) + wp.float64(q.compliance) * F)

@@ -70,6 +70,7 @@ class Tuples:
         result.world = model.array(self.world.astype(np.int32), wp.int32)
         result.item = self.items
         result.lam = wp.zeros(self.count, dtype=model.precision.scalar, device=model.device)
+        result.scale = wp.zeros(1, dtype=wp.float64, device=model.device)
         if self.breakable:
             result.broken = wp.zeros(self.count, dtype=wp.int32, device=model.device)
         return result

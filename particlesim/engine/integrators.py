@@ -6,11 +6,8 @@ from typing import Any
 
 from .. import validate
 from ..kernels.engine.implicit import lead_kernel, settle_kernel
-from ..kernels.engine.integrate import (
-    integration_kernels,
-    motion_type,
-    tick_kernel,
-)
+from ..kernels.engine.integrate import motion_type
+from ..kernels.engine.motion_kernels import integration_kernels, tick_kernel
 from ..scene.settings import INTEGRATORS, Settings
 from .execution.launch import launch
 from .limit import explicit_step, predicted_step
@@ -92,8 +89,9 @@ class Integrator:
         state.require(names)
         self.forces, self.constrained = forces, constrained
         self.kernels = integration_kernels(
-            model.precision, model.periodic, forces, settings.compensated, constrained, remember
-        )
+            model.precision, model.periodic, forces, settings.compensated, constrained, remember,
+            model.vectorised,
+        )  # fmt: skip
         self.motion = _motion(model, state)
 
     @property
@@ -118,7 +116,7 @@ class Integrator:
         The same as v = (x - x_previous) / dt in exact arithmetic, without its cancellation.
         """
         if self.constrained and dt > 0:
-            self._launch(self.kernels.follow_corrections, 1.0 / dt)
+            self._launch_blocks(self.kernels.follow_corrections, 1.0 / dt)
 
     def lead(self, dt: float) -> None:
         """How far the velocity of the implicit forces is ahead, in ``state.velocity_lead``."""
@@ -138,7 +136,7 @@ class Integrator:
     def kick(self, dt: float) -> None:
         """v += w f dt, w = 1/m; nothing in a scene without forces."""
         if self.forces:
-            self._launch(self.kernels.kick_only, dt)
+            self._launch_blocks(self.kernels.kick_only, dt)
 
     def drift(self, dt: float) -> None:
         """x += v dt, into the periodic box. The clock goes with the positions."""
@@ -146,10 +144,14 @@ class Integrator:
 
     def move(self, kick: float, drift: float) -> None:
         """v += w f kick; x += v drift, in one launch. The clock goes with the positions."""
-        self._launch(self.kernels.advance, kick, drift)
+        self._launch_blocks(self.kernels.advance, kick, drift)
         if "time" in self.state:
             model = self.model
             launch(tick_kernel(), model.world_count, [drift, self.state.time], model.device)
+
+    def _launch_blocks(self, kernel: Any, *scalars: float) -> None:
+        block, inputs = self.kernels.block, [*scalars, self.motion]
+        launch(kernel, -(-self.count // block), inputs, self.model.device, rows=block)
 
     def _launch(self, kernel: Any, *scalars: float) -> None:
         launch(kernel, self.count, [*scalars, self.motion], self.model.device)
