@@ -103,30 +103,36 @@ def follow_kernel(
 
 @functools.cache
 def slope_kernel(
-    law: wp.Function, arguments: tuple[str, ...], by: int, precision: Precision, data: Any,
-    params: Any,
+    law: wp.Function, arguments: tuple[str, ...], by: int, own: bool, precision: Precision,
+    data: Any, params: Any,
 ) -> wp.Kernel:  # fmt: skip
-    """Kernel: slope += df/dv and own += f of each member, v the law's argument ``by``."""
+    """Kernel: f += law(...) and slope += df/dv of each member, v the law's argument ``by``; with
+    ``own`` that force is added to the sum of the implicit ones, too.
+    """
     slope = _slope(law, arguments, by, precision, data, params)
     evaluate = _evaluation(law, arguments, precision, data, params, None, force=True)
 
     @register
-    def particle_slope(
+    def particle_force_and_slope(
         first: int,
         members: wp.array(dtype=wp.int32),
         world: wp.array(dtype=wp.int32),
         parameters: wp.array(dtype=params),
         d: data,
+        f_io: wp.array(dtype=precision.vec3),
         slope_io: wp.array(dtype=precision.mat33),
         own_io: wp.array(dtype=precision.vec3),
     ):
         k = first + wp.tid()
         i = members[k]
         w = world[k]
+        f = evaluate(i, w, d.x[i], d, parameters[w])
+        f_io[i] = f_io[i] + f
         slope_io[i] = slope_io[i] + slope(i, w, d.x[i], d, parameters[w])
-        own_io[i] = own_io[i] + evaluate(i, w, d.x[i], d, parameters[w])
+        if wp.static(own):
+            own_io[i] = own_io[i] + f
 
-    return particle_slope
+    return particle_force_and_slope
 
 
 @functools.cache

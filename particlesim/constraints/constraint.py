@@ -218,8 +218,7 @@ class Constraint(ConstraintBase):
         self.fresh = False
         for start, end in self.tuples.spans:
             inputs = [start, end, scale, self.model.box, self.struct, self.bodies, own, 1.0 / dt]
-            blocks = -(-(end - start) // self.block)
-            launch(self.project_kernel, blocks, inputs, self.model.device, rows=self.block)
+            launch(self.project_kernel, end - start, inputs, self.model.device, self.block)
 
     def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if self.count and self.break_force is not None:

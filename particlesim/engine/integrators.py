@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .. import validate
-from ..kernels.engine.implicit import lead_kernel, settle_kernel
+from ..kernels.engine.implicit import implicit_kernels
 from ..kernels.engine.integrate import motion_type
 from ..kernels.engine.motion_kernels import integration_kernels, tick_kernel
 from ..scene.settings import INTEGRATORS, Settings
@@ -81,7 +81,9 @@ class Integrator:
             names |= {"image", "world"}
         self.predicted = predicted and forces and self.carries_forces
         if implicit:
-            names |= {"force_slope", "implicit_force", "velocity_lead"}
+            names |= {"force_slope", "velocity_lead"} | (
+                set() if self.damps else {"implicit_force"}
+            )
         if self.predicted:
             names |= {"half_velocity"} | (
                 {"half_velocity_error"} if settings.compensated else set()
@@ -120,18 +122,22 @@ class Integrator:
 
     def lead(self, dt: float) -> None:
         """How far the velocity of the implicit forces is ahead, in ``state.velocity_lead``."""
-        self._implicitly(lead_kernel, dt)
+        self._implicitly("lead", dt, self.state.velocity_lead)
 
     def settle(self, dt: float) -> None:
         """The sum of all forces is what takes the velocity there."""
-        self._implicitly(settle_kernel, dt)
+        self._implicitly("settle", dt, self.state.velocity_lead)
 
-    def _implicitly(self, kernel: Any, dt: float) -> None:
+    def respond(self, dt: float) -> None:
+        """``lead`` and ``settle`` in one launch."""
+        self._implicitly("respond", dt)
+
+    def _implicitly(self, name: str, dt: float, *lead: Any) -> None:
         state, model = self.state, self.model
-        names = ("force_slope", "implicit_force", "velocity_lead")
-        inputs = [0.5 * dt, self.motion, *(state[name] for name in names)]
-        made = kernel(model.precision, self.damps, self.predicted)
-        launch(made, self.count, inputs, model.device)
+        own = None if self.damps else state.implicit_force
+        kernel = getattr(implicit_kernels(model.precision, self.damps, self.predicted), name)
+        inputs = [0.5 * dt, self.motion, state.force_slope, own, *lead]
+        launch(kernel, self.count, inputs, model.device)
 
     def kick(self, dt: float) -> None:
         """v += w f dt, w = 1/m; nothing in a scene without forces."""
@@ -150,8 +156,8 @@ class Integrator:
             launch(tick_kernel(), model.world_count, [drift, self.state.time], model.device)
 
     def _launch_blocks(self, kernel: Any, *scalars: float) -> None:
-        block, inputs = self.kernels.block, [*scalars, self.motion]
-        launch(kernel, -(-self.count // block), inputs, self.model.device, rows=block)
+        inputs, block = [*scalars, self.motion], self.kernels.block
+        launch(kernel, self.count, inputs, self.model.device, block)
 
     def _launch(self, kernel: Any, *scalars: float) -> None:
         launch(kernel, self.count, [*scalars, self.motion], self.model.device)

@@ -164,10 +164,12 @@ class ParticleForce(Interaction):
         return self.functions[k], tuple(called)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        self._launch(self.kernel, state.force)
-        if self.implicit:
-            kernel = kernels.slope_kernel(*self._called(0), self._by, *self._types)
-            self._launch(kernel, state.force_slope, state.implicit_force)
+        if not self.implicit:
+            self._launch(self.kernel, state.force)
+            return
+        own = state.implicit_force if "implicit_force" in state else None
+        kernel = kernels.slope_kernel(*self._called(0), self._by, own is not None, *self._types)
+        self._launch(kernel, state.force, state.force_slope, own)
 
     def follow(self, state: State, damps: bool) -> None:
         kernel = kernels.follow_kernel(*self._called(0), self._by, damps, *self._types)
@@ -177,7 +179,7 @@ class ParticleForce(Interaction):
     def _by(self) -> int:
         return self.arguments[0].names.index("velocity")
 
-    def _launch(self, kernel: wp.Kernel, *arrays: wp.array) -> None:
+    def _launch(self, kernel: wp.Kernel, *arrays: wp.array | None) -> None:
         inputs = [self.members, self.world, self.params, self.data, *arrays]
         launch(kernel, self.count, inputs, self.model.device)
 

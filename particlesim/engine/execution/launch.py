@@ -36,10 +36,15 @@ class Launch:
     inputs: Sequence[Any]
     device: Any
     owner: str = ""
-    rows: int = 1  # that a thread makes
+    block: int = 1  # rows that a thread takes
+
+    @property
+    def threads(self) -> int:
+        """How many there are, one for each block of rows."""
+        return -(-self.dim // self.block)
 
     def issue(self) -> None:
-        wp.launch(self.kernel, self.dim, [0, *self.inputs], device=self.device)
+        wp.launch(self.kernel, self.threads, [0, *self.inputs], device=self.device)
 
     def record(self, chunks: int = 1, least: int = CHUNK) -> list[Any]:
         """Commands with packed arguments: a chunk is the same launch from another first row.
@@ -48,17 +53,12 @@ class Launch:
             chunks: How many at most.
             least: Rows of a chunk.
         """
-        pieces = max(1, min(chunks, self.dim, self.dim * self.rows // least))
-        edges = [self.dim * k // pieces for k in range(pieces + 1)]
+        pieces = max(1, min(chunks, self.threads, self.dim // least))
+        edges = [self.threads * k // pieces for k in range(pieces + 1)]
+        spans = [(start, stop - start) for start, stop in itertools.pairwise(edges)]
         return [
-            wp.launch(
-                self.kernel,
-                stop - start,
-                [start, *self.inputs],
-                device=self.device,
-                record_cmd=True,
-            )
-            for start, stop in itertools.pairwise(edges)
+            wp.launch(self.kernel, n, [start, *self.inputs], device=self.device, record_cmd=True)
+            for start, n in spans
         ]
 
 
@@ -139,8 +139,7 @@ class _Recorder:
         rows = math.prod(dim) if isinstance(dim, Sequence) else int(dim)
         device = arguments.get("device")
         inputs = [*arguments.get("inputs", ()), *arguments.get("outputs", ())]
-        given = arguments["kernel"], rows, inputs, device, _owner.get()
-        _now().add(Whole(*given, arguments=arguments))
+        _now().add(Whole(arguments["kernel"], rows, inputs, device, _owner.get(), 1, arguments))
 
     def call(self, run: Callable[[], None]) -> None:
         _now().add(Call(run))
@@ -197,7 +196,7 @@ def owner(name: str) -> Iterator[None]:
         yield
 
 
-def launch(kernel: Any, dim: int, inputs: Sequence[Any], device: Any, rows: int = 1) -> None:
+def launch(kernel: Any, dim: int, inputs: Sequence[Any], device: Any, block: int = 1) -> None:
     """Launch a kernel over ``dim`` rows: now, or each time that what is being recorded is run.
 
     This is how an interaction, a constraint or an integrator of your own runs a kernel in its
@@ -220,7 +219,7 @@ def launch(kernel: Any, dim: int, inputs: Sequence[Any], device: Any, rows: int 
         dim: Rows; nothing happens for 0.
         inputs: What the kernel takes after ``first``: arrays, structs, numbers.
         device: Where the arrays are: ``model.device``.
-        rows: How many a thread makes, of a kernel whose rows are blocks of them.
+        block: Rows that a thread takes; what the kernel adds up is then the number of its block.
 
     Example:
         >>> @wp.kernel
@@ -237,7 +236,7 @@ def launch(kernel: Any, dim: int, inputs: Sequence[Any], device: Any, rows: int 
         if program is not None:
             program.touched = True
         return
-    operation = Launch(kernel, dim, inputs, device, _owner.get(), rows)
+    operation = Launch(kernel, dim, inputs, device, _owner.get(), block)
     if program is not None:
         program.add(operation)
     else:
@@ -278,8 +277,7 @@ class Frame:
     @property
     def largest(self) -> int:
         """Rows of the largest launch."""
-        launches = [each for part in self.parts for each in part.launches()]
-        return max((each.dim * each.rows for each in launches), default=0)
+        return max((each.dim for part in self.parts for each in part.launches()), default=0)
 
     @property
     def parts(self) -> tuple[Program, Program, Program]:
