@@ -47,17 +47,23 @@ def _added(precision: Precision, compensated: bool, name: str, step: str) -> str
 
 
 def _loop(before: str, body: str) -> str:
-    """C++: over the numbers of the rows from first to last. No two arrays share memory."""
+    """C++: over the numbers of the rows from first to last. No two arrays share memory.
+
+    Products are rounded before they are added, as they are in Warp's own functions.
+    """
     return f"""{before}
     const long long begin = 3 * (long long)first, end = 3 * (long long)last;
 #pragma clang loop vectorize(assume_safety)
-    for (long long k = begin; k < end; ++k) {{ {body} }}
+    for (long long k = begin; k < end; ++k) {{
+#pragma clang fp contract(off)
+        {body}
+    }}
 """
 
 
 def _leave_function(precision: Precision, periodic: Periodicity) -> wp.Function:
     """``leave(first, last, m)``: 0 where none of the rows has left its periodic box, as ``wrap``
-    sees it; where they are of several worlds, 1.
+    sees it.
     """
     Motion, c = motion_type(precision), precision.c
     tests = " ".join(
@@ -71,10 +77,14 @@ def _leave_function(precision: Precision, periodic: Periodicity) -> wp.Function:
     snippet = f"""
     const {c}* x = {elements("m.x", c)};
     const int* world = {elements("m.world", "int")};
-    if (world[first] != world[last - 1]) return 1;
-    const auto b = m.box.data[world[first]];
     int out = 0;
-    for (int i = first; i < last; ++i) {{ {tests} }}
+    auto look = [&](int i, const auto& b) {{ {tests} }};
+    if (world[first] == world[last - 1]) {{  // as mostly: one box for all of them
+        const auto b = m.box.data[world[first]];
+        for (int i = first; i < last; ++i) look(i, b);
+    }} else {{
+        for (int i = first; i < last; ++i) look(i, m.box.data[world[i]]);
+    }}
     return out;
 """
 
