@@ -23,6 +23,7 @@ def force_kernel(law: Solved) -> wp.Kernel:
     """Kernel: f_a -= grad_a C (C / alpha + beta dC/dt)."""
     real, Box, Tuples, Bodies = law.types
     vec3, size, view = law.precision.vec3, law.size, view_function(law)
+    damped, one_sided = law.damped, law.one_sided
 
     @register
     def constraint_force(
@@ -40,12 +41,14 @@ def force_kernel(law: Solved) -> wp.Kernel:
             r = seats.tuple[n]
             ids = t.particle[r]
             q = t.item[r]
-            _x, _e, _X, C, G = view(r, box, t, b)
-            rate = real(0.0)
-            for a in range(wp.static(size)):
-                rate += wp.dot(G[a], b.v[ids[a]])
-            pull = C / q.compliance + q.damping * rate
-            if t.one_sided != 0:  # never adhesive, whatever the damping
+            _X, C, G = view(r, box, t, b)
+            pull = C / q.compliance
+            if wp.static(damped):
+                rate = real(0.0)
+                for a in range(wp.static(size)):
+                    rate += wp.dot(G[a], b.v[ids[a]])
+                pull = pull + q.damping * rate
+            if wp.static(one_sided):  # never adhesive, whatever the damping
                 pull = wp.where(C < real(0.0), wp.min(pull, real(0.0)), real(0.0))
             f = G[seats.seat[n]] * pull
             if wp.isfinite(f[0] + f[1] + f[2]):  # no gradient there, no force
@@ -59,7 +62,7 @@ def force_kernel(law: Solved) -> wp.Kernel:
 def measure_kernel(law: Solved) -> wp.Kernel:
     """Kernel: energy C^2 / (2 alpha) and virial, to each of a tuple's particles its share."""
     real, Box, Tuples, Bodies = law.types
-    size, view = law.size, view_function(law)
+    size, view, one_sided = law.size, view_function(law), law.one_sided
 
     @register
     def constraint_measure(
@@ -75,11 +78,11 @@ def measure_kernel(law: Solved) -> wp.Kernel:
         i = seats.particle[k]
         for n in range(seats.begin[k], seats.begin[k + 1]):
             r = seats.tuple[n]
-            _x, _e, X, C, G = view(r, box, t, b)
+            X, C, G = view(r, box, t, b)
             a = seats.seat[n]
             pull = C / t.item[r].compliance
-            if t.one_sided != 0 and C >= real(0.0):
-                pull = real(0.0)
+            if wp.static(one_sided):
+                pull = wp.where(C >= real(0.0), real(0.0), pull)
             w = -wp.float64(pull) * wp.float64(wp.dot(G[a], X[a] - X[0]))
             if wp.isfinite(w):
                 share = wp.float64(wp.static(1.0 / (2.0 * size)))
@@ -92,11 +95,12 @@ def measure_kernel(law: Solved) -> wp.Kernel:
 def counted_function(law: Solved) -> wp.Function:
     """``counted(C, r, t)``: C of tuple r; of an inequality what is below 0, of a broken one 0."""
     real, _, Tuples, _ = law.types
+    one_sided, breakable = law.one_sided, law.breakable
 
     def counted(C: real, r: int, t: Tuples):
-        if t.one_sided != 0:
+        if wp.static(one_sided):
             C = wp.min(C, real(0.0))
-        if t.breakable != 0:
+        if wp.static(breakable):
             if t.broken[r] != 0:
                 C = real(0.0)
         return C
@@ -122,7 +126,6 @@ def virial_kernel(law: Solved) -> wp.Kernel:
         box: wp.array(dtype=Box),
         t: Tuples,
         b: Bodies,
-        scale: wp.array(dtype=wp.float64),
         energy_io: wp.array(dtype=wp.float64),
         virial_io: wp.array(dtype=wp.float64),
     ):
@@ -131,10 +134,10 @@ def virial_kernel(law: Solved) -> wp.Kernel:
         for n in range(seats.begin[k], seats.begin[k + 1]):
             r = seats.tuple[n]
             a = seats.seat[n]
-            _x, _e, X, C, G = view(r, box, t, b)
+            X, C, G = view(r, box, t, b)
             C = counted(C, r, t)
             alpha = wp.float64(t.item[r].compliance)
-            F = wp.float64(t.lam[r]) * scale[0] * wp.float64(b.unit)
+            F = wp.float64(t.lam[r]) * t.scale[0] * wp.float64(b.unit)
             if alpha > wp.float64(0.0) and C != real(0.0):
                 twice = wp.float64(C) * wp.float64(C) / alpha
                 if F != wp.float64(0.0):

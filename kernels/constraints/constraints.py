@@ -1,4 +1,4 @@
-"""XPBD on given tuples of particles: one Newton step of C(x) = 0 a tuple, colour by colour.
+"""Given tuples of particles and the constraints on them: what kernels take, see and make of them.
 
 An *evaluation* is a Warp function ``evaluate(X, q) -> (C, G)``: the constraint and its gradient at
 the positions ``X`` (k rows) with the tuple's parameters ``q``. It is derived from a law by
@@ -28,6 +28,10 @@ class Solved:
     item: Any  # struct of a tuple's parameters
     relative: bool  # evaluated at positions seen from the tuple's first particle
     unit: bool  # the gradients have unit length
+    # What some tuple of some world asks for; what none does is not compiled.
+    damped: bool
+    one_sided: bool
+    breakable: bool
 
     @property
     def types(self) -> tuple[Any, Any, Any, Any]:
@@ -65,9 +69,8 @@ def tuples_type(precision: Precision, size: int, item: Any) -> Any:
         "world": wp.array(dtype=wp.int32),
         "item": wp.array(dtype=item),
         "lam": wp.array(dtype=precision.scalar),
+        "scale": wp.array(dtype=wp.float64),  # 1 / dt^2 of the substep that made them
         "broken": wp.array(dtype=wp.int32),  # empty where nothing can break
-        "one_sided": wp.int32,
-        "breakable": wp.int32,
     }
     return structure(f"Tuples{size}_{precision.name}", fields)
 
@@ -90,18 +93,34 @@ def rounding_function(precision: Precision, compensated: bool) -> wp.Function:
     return function(kept)
 
 
-def place_function(precision: Precision, compensated: bool) -> wp.Function:
-    """``place(i, x, e, dx, b)``: particle i goes from x, with rounding error e, on by dx."""
-    vec3, Bodies, add = precision.vec3, bodies_type(precision), compensated_sum(precision)
+def shift_function(precision: Precision, compensated: bool) -> wp.Function:
+    """``shift(x, e, c, dx) -> (x, e, c)``: x on by dx, its rounding error, all corrections."""
+    vec3, add = precision.vec3, compensated_sum(precision.vec3)
 
-    def place(i: int, x: vec3, e: vec3, dx: vec3, b: Bodies):
+    def shift(x: vec3, e: vec3, c: vec3, dx: vec3):
+        total = x + dx
+        error = e
         if wp.static(compensated):
             total, error = add(x, dx, e)
+        return total, error, c + dx
+
+    return function(shift)
+
+
+def place_function(precision: Precision, compensated: bool) -> wp.Function:
+    """``place(i, x, e, dx, b)``: particle i goes from x, with rounding error e, on by dx."""
+    vec3, Bodies, shift = (
+        precision.vec3,
+        bodies_type(precision),
+        shift_function(precision, compensated),
+    )
+
+    def place(i: int, x: vec3, e: vec3, dx: vec3, b: Bodies):
+        total, error, correction = shift(x, e, b.correction[i], dx)
+        b.x[i] = total
+        b.correction[i] = correction
+        if wp.static(compensated):
             b.x_error[i] = error
-            b.x[i] = total
-        else:
-            b.x[i] = x + dx
-        b.correction[i] = b.correction[i] + dx
 
     return function(place)
 
@@ -130,9 +149,10 @@ def distance_evaluation(sign: int, precision: Precision, item: Any) -> wp.Functi
     def distance_constraint(X: positions, q: item):
         d = X[1] - X[0]
         r = wp.length(d)
+        inverse = real(1.0) / r
         n = apart
-        if r > real(0.0):
-            n = d * (real(1.0) / r)
+        for k in range(3):  # chosen number by number, see correct_function
+            n[k] = wp.where(r > real(0.0), d[k] * inverse, apart[k])
         if wp.static(sign < 0):
             return q.rest_length - r, wp.matrix_from_rows(n, -n)
         else:
@@ -141,19 +161,43 @@ def distance_evaluation(sign: int, precision: Precision, item: Any) -> wp.Functi
     return function(distance_constraint)
 
 
+def seen_function(law: Solved) -> wp.Function:
+    """``seen(x, e, B) -> X``: what an evaluation sees of a tuple.
+
+    Of its positions and what rounding has kept from them, in one piece of a periodic box, each the
+    image next to the one before it. Seen from the first particle, together with what rounding has
+    kept, a distance is far from the origin as exact as near to it.
+    """
+    size, relative, compensated = law.size, law.relative, law.compensated
+    positions, wraps = positions_type(law.precision, size), bool(law.periodic)
+    vec3, Box = law.precision.vec3, box_type(law.precision)
+    image = minimum_image(law.precision, law.periodic)
+
+    def seen(x: positions, e: positions, B: Box):
+        X = x
+        if wp.static(relative or wraps):
+            if wp.static(relative):
+                X[0] = vec3()
+            for a in range(1, wp.static(size)):
+                d = x[a] - x[a - 1]
+                if wp.static(wraps):
+                    d = image(d, B)
+                if wp.static(relative and compensated):
+                    d = d + (e[a] - e[a - 1])
+                X[a] = X[a - 1] + d
+        return X
+
+    return function(seen)
+
+
 @functools.cache
 def view_function(law: Solved) -> wp.Function:
-    """``view(r, box, t, b) -> (x, e, X, C, G)``: tuple r as it is now.
-
-    Its positions, what rounding has kept from them, what the evaluation sees of both, in one piece
-    of a periodic box, each the image next to the one before it, and what it makes of it. Seen from
-    the first particle, together with what rounding has kept, a distance is far from the origin as
-    exact as near to it.
+    """``view(r, box, t, b) -> (X, C, G)``: tuple r as an evaluation sees it now, and what it makes
+    of it.
     """
     _real, Box, Tuples, Bodies = law.types
-    evaluate, size, relative, compensated = law.evaluate, law.size, law.relative, law.compensated
-    positions, wraps = positions_type(law.precision, size), bool(law.periodic)
-    vec3, image = law.precision.vec3, minimum_image(law.precision, law.periodic)
+    positions, wraps = positions_type(law.precision, law.size), bool(law.periodic)
+    evaluate, seen, size, compensated = law.evaluate, seen_function(law), law.size, law.compensated
 
     def view(r: int, box: wp.array(dtype=Box), t: Tuples, b: Bodies):
         ids = t.particle[r]
@@ -163,110 +207,22 @@ def view_function(law: Solved) -> wp.Function:
             x[a] = b.x[ids[a]]
             if wp.static(compensated):
                 e[a] = b.x_error[ids[a]]
-        X = x
-        if wp.static(relative or wraps):
-            if wp.static(relative):
-                X[0] = vec3()
-            for a in range(1, wp.static(size)):
-                d = x[a] - x[a - 1]
-                if wp.static(wraps):
-                    d = image(d, box[t.world[r]])
-                if wp.static(relative and compensated):
-                    d = d + (e[a] - e[a - 1])
-                X[a] = X[a - 1] + d
+        B = Box()
+        if wp.static(wraps):
+            B = box[t.world[r]]
+        X = seen(x, e, B)
         C, G = evaluate(X, t.item[r])
-        return x, e, X, C, G
+        return X, C, G
 
     # Emitted behind the evaluation, which may itself stand behind the adjoints that it calls.
     return function(view, after_gradients=True)
 
 
 @functools.cache
-def project_kernel(law: Solved) -> wp.Kernel:
-    """Kernel: one sweep over the tuples of a colour (Macklin et al. 2016, eqs. 17, 18 and 26).
-
-    dlam = (-C - alpha~ lam - gamma grad C . (x - x_prev)) / ((1 + gamma) sum w |grad C|^2 + alpha~)
-    with alpha~ = alpha / dt^2 and gamma = alpha beta / dt; then dx_a = w_a grad_a C dlam. The way
-    of this substep, x - x_prev, is v dt plus the corrections so far, which does not cancel.
-    """
-    real, Box, Tuples, Bodies = law.types
-    size, unit, weights = law.size, law.unit, law.precision.vector(law.size)
-    view, place = view_function(law), place_function(law.precision, law.compensated)
-
-    @register
-    def project_tuples(
-        first: int,
-        start: int,
-        box: wp.array(dtype=Box),
-        t: Tuples,
-        b: Bodies,
-        dt: real,
-        inverse_dt: real,
-    ):
-        r = start + first + wp.tid()
-        if t.breakable != 0:
-            if t.broken[r] != 0:
-                return
-        ids = t.particle[r]
-        q = t.item[r]
-        x, e, _X, C, G = view(r, box, t, b)
-        w = weights()
-        s = real(0.0)
-        total = real(0.0)
-        for a in range(wp.static(size)):
-            w[a] = b.w[ids[a]] * b.unit
-            total += w[a]
-            if wp.static(unit):
-                s += w[a]
-            else:
-                s += w[a] * wp.length_sq(G[a])
-        lam = t.lam[r]
-        alpha = q.compliance * inverse_dt * b.unit * inverse_dt  # in an order that stays in range
-        gamma = q.compliance * q.damping * inverse_dt
-        way = real(0.0)
-        if gamma > real(0.0):
-            for a in range(wp.static(size)):
-                way += wp.dot(G[a], b.v[ids[a]] * dt + b.correction[ids[a]])
-        new = lam + (-C - alpha * lam - gamma * way) / ((real(1.0) + gamma) * s + alpha)
-        if t.one_sided != 0:
-            new = wp.max(new, real(0.0))
-            if C >= real(0.0) and lam == real(0.0):
-                new = real(0.0)
-        d_lam = new - lam
-        # All pinned, or no gradient (a comparison with NaN is false): nothing sensible to do.
-        if s > real(0.0) and wp.abs(d_lam) * total < b.most:
-            t.lam[r] = new
-            for a in range(wp.static(size)):
-                place(ids[a], x[a], e[a], G[a] * (w[a] * d_lam), b)
-
-    return project_tuples
-
-
-@functools.cache
-def reset_kernel(precision: Precision) -> wp.Kernel:
-    """Kernel: multipliers to zero as a substep starts, and its time scale kept for reports."""
-    real = precision.scalar
-
-    @register
-    def reset_multipliers(
-        first: int,
-        inverse_dt: wp.float64,
-        lam_out: wp.array(dtype=real),
-        scale_out: wp.array(dtype=wp.float64),
-    ):
-        r = first + wp.tid()
-        lam_out[r] = real(0.0)
-        if r == 0:
-            scale_out[0] = inverse_dt * inverse_dt
-
-    return reset_multipliers
-
-
-@functools.cache
 def strain_kernel(law: Solved) -> wp.Kernel:
     """Kernel: force of each tuple, |lam| max_a |grad_a C| / dt^2; what exceeds its limit breaks."""
     real, Box, Tuples, Bodies = law.types
-    size, view = law.size, view_function(law)
+    size, view, breakable = law.size, view_function(law), law.breakable
 
     @register
     def strain_tuples(
@@ -275,17 +231,17 @@ def strain_kernel(law: Solved) -> wp.Kernel:
         box: wp.array(dtype=Box),
         t: Tuples,
         b: Bodies,
-        scale: wp.array(dtype=wp.float64),
         force_out: wp.array(dtype=real),
     ):
         r = first + wp.tid()
-        _x, _e, _X, _C, G = view(r, box, t, b)
+        _X, _C, G = view(r, box, t, b)
         steepest = real(0.0)
         for a in range(wp.static(size)):
             steepest = wp.max(steepest, wp.length(G[a]))
-        force = real(wp.float64(wp.abs(t.lam[r]) * steepest) * scale[0] * wp.float64(b.unit))
+        force = real(wp.float64(wp.abs(t.lam[r]) * steepest) * t.scale[0] * wp.float64(b.unit))
         force_out[r] = force
-        if may_break != 0 and force > t.item[r].break_force:
-            t.broken[r] = 1
+        if wp.static(breakable):
+            if may_break != 0 and force > t.item[r].break_force:
+                t.broken[r] = 1
 
     return strain_tuples

@@ -1,4 +1,4 @@
-"""Integration: kicks and drifts, with compensated sums where asked for."""
+"""Integration: what kicks and drifts do to a particle, with compensated sums where asked for."""
 
 import functools
 from types import SimpleNamespace
@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from ..precision import Precision, function, register, structure
+from ..precision import Precision, function, structure
 from .loops import Periodicity, box_type
 
 
@@ -31,14 +31,12 @@ def motion_type(precision: Precision) -> Any:
     return structure(f"Motion_{precision.name}", fields)
 
 
-def compensated_sum(precision: Precision) -> wp.Function:
-    """``add(x, dx, e) -> (sum, error)``: what the sum rounds away goes with the next one's dx.
-
-    Kahan (1965).
+def compensated_sum(kind: Any) -> wp.Function:
+    """``add(x, dx, e) -> (sum, error)``, of vectors or numbers: what the sum rounds away goes with
+    the next one's dx (Kahan 1965).
     """
-    vec3 = precision.vec3
 
-    def kahan(x: vec3, dx: vec3, e: vec3):
+    def kahan(x: kind, dx: kind, e: kind):
         step = dx + e
         total = x + step
         return total, step - (total - x)
@@ -51,7 +49,7 @@ def motion_functions(
 ) -> tuple[wp.Function, wp.Function]:
     """``kick(i, dt, m) -> v``: v += w f dt; and ``move(i, dx, m)``: x += dx."""
     vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
-    add = compensated_sum(precision)
+    add = compensated_sum(precision.vec3)
 
     def kick(i: int, dt: real, m: Motion):
         v = m.v[i]
@@ -125,74 +123,43 @@ def wrap_function(
 
 
 @functools.cache
-def integration_kernels(
+def plain_rows(
     precision: Precision, periodic: Periodicity, forces: bool, compensated: bool,
     constrained: bool, remember: bool,
 ) -> SimpleNamespace:  # fmt: skip
-    """The kernels for a scene with forces, Kahan sums, corrections that follow; ``remember``: the
-    positions at the start of the substep are kept.
+    """What is done to rows from ``first`` to ``last``, in Warp's own language.
+
+    - ``advance(first, last, dt_kick, dt_drift, m)``: v += w f dt; x += v dt;
+    - ``kick(first, last, dt, m)``: v += w f dt;
+    - ``follow(first, last, inverse_dt, m)``: v += correction / dt, the velocity follows.
     """
     vec3, real, Motion = precision.vec3, precision.scalar, motion_type(precision)
     kick, move = motion_functions(precision, forces, compensated)
     wrap = wrap_function(move, precision, compensated, remember)
     wraps = bool(periodic)
 
-    @register
-    def advance(first: int, dt_kick: real, dt_drift: real, m: Motion):
-        """v += w f dt; x += v dt."""
-        i = first + wp.tid()
-        if wp.static(remember):
-            m.x_previous[i] = m.x[i]
-        v = kick(i, dt_kick, m)
-        move(i, v * dt_drift, m)
-        if wp.static(constrained):
-            m.correction[i] = vec3()
-        if wp.static(wraps):
-            wrap(i, m)
+    def advance_plainly(first: int, last: int, dt_kick: real, dt_drift: real, m: Motion):
+        for i in range(first, last):
+            if wp.static(remember):
+                m.x_previous[i] = m.x[i]
+            v = kick(i, dt_kick, m)
+            move(i, v * dt_drift, m)
+            if wp.static(constrained):
+                m.correction[i] = vec3()
+            if wp.static(wraps):
+                wrap(i, m)
 
-    @register
-    def kick_only(first: int, dt: real, m: Motion):
-        """v += w f dt."""
-        kick(first + wp.tid(), dt, m)
+    def kick_plainly(first: int, last: int, dt: real, m: Motion):
+        for i in range(first, last):
+            kick(i, dt, m)
 
-    @register
-    def foresee(first: int, dt: real, m: Motion):
-        """v += w f dt, as the forces will leave it if they stay; what it was is kept."""
-        i = first + wp.tid()
-        m.v_half[i] = m.v[i]
-        if wp.static(compensated):
-            m.v_half_error[i] = m.v_error[i]
-        kick(i, dt, m)
-
-    @register
-    def go_back(first: int, m: Motion):
-        """v is again what it was."""
-        i = first + wp.tid()
-        m.v[i] = m.v_half[i]
-        if wp.static(compensated):
-            m.v_error[i] = m.v_half_error[i]
-
-    @register
-    def follow_corrections(first: int, inverse_dt: real, m: Motion):
-        """v += correction / dt: the velocity follows the projection."""
-        i = first + wp.tid()
-        m.v[i] = m.v[i] + m.correction[i] * inverse_dt
-        if wp.static(wraps):
-            wrap(i, m)
+    def follow_plainly(first: int, last: int, inverse_dt: real, m: Motion):
+        for i in range(first, last):
+            m.v[i] = m.v[i] + m.correction[i] * inverse_dt
+            if wp.static(wraps):
+                wrap(i, m)
 
     return SimpleNamespace(
-        advance=advance, kick_only=kick_only, foresee=foresee, go_back=go_back,
-        follow_corrections=follow_corrections,
+        advance=function(advance_plainly), kick=function(kick_plainly),
+        follow=function(follow_plainly),
     )  # fmt: skip
-
-
-@functools.cache
-def tick_kernel() -> wp.Kernel:
-    """Advance the clocks of the worlds."""
-
-    @register
-    def tick(first: int, dt: wp.float64, time_io: wp.array(dtype=wp.float64)):
-        w = first + wp.tid()
-        time_io[w] = time_io[w] + dt
-
-    return tick

@@ -26,7 +26,7 @@ def tuples_kernel(law: Solved) -> wp.Kernel:
         miss_out: wp.array(dtype=real),
     ):
         r = first + wp.tid()
-        _x, _e, _X, C, _G = view(r, box, t, b)
+        _X, C, _G = view(r, box, t, b)
         miss_out[r] = counted(C, r, t)
 
     return miss_tuples
@@ -40,6 +40,7 @@ def off_kernel(law: Solved) -> wp.Kernel:
     """
     real, Box, Tuples, Bodies = law.types
     size, view = law.size, view_function(law)
+    damped, one_sided, breakable = law.damped, law.one_sided, law.breakable
 
     @register
     def measure_off(
@@ -47,11 +48,10 @@ def off_kernel(law: Solved) -> wp.Kernel:
         box: wp.array(dtype=Box),
         t: Tuples,
         b: Bodies,
-        scale: wp.array(dtype=wp.float64),
         off_out: wp.array(dtype=real),
     ):
         r = first + wp.tid()
-        _x, _e, X, C, G = view(r, box, t, b)
+        X, C, G = view(r, box, t, b)
         q = t.item[r]
         extent = real(0.0)
         slope = real(0.0)
@@ -60,12 +60,13 @@ def off_kernel(law: Solved) -> wp.Kernel:
             extent = wp.max(extent, wp.length(X[a] - X[0]))
             slope = slope + wp.length_sq(G[a])
             rate = rate + wp.dot(G[a], b.v[t.particle[r][a]])
-        F = wp.float64(t.lam[r]) * scale[0] * wp.float64(b.unit)
-        give = wp.float64(q.compliance) * (F + wp.float64(q.damping) * wp.float64(rate))
-        miss = wp.abs(wp.float64(C) + give)
-        if t.one_sided != 0 and C >= real(0.0):
-            miss = wp.float64(0.0)
-        if t.breakable != 0:
+        F = wp.float64(t.lam[r]) * t.scale[0] * wp.float64(b.unit)
+        if wp.static(damped):
+            F = F + wp.float64(q.damping) * wp.float64(rate)
+        miss = wp.abs(wp.float64(C) + wp.float64(q.compliance) * F)
+        if wp.static(one_sided):
+            miss = wp.where(C >= real(0.0), wp.float64(0.0), miss)
+        if wp.static(breakable):
             if t.broken[r] != 0:
                 miss = wp.float64(0.0)
         if miss > wp.float64(0.0):

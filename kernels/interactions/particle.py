@@ -6,8 +6,19 @@ from typing import Any
 import warp as wp
 
 from ..engine.loops import box_type
-from ..precision import FLOAT32, FLOAT64, Precision, function, function_from_source, register
+from ..precision import (
+    FLOAT32,
+    FLOAT64,
+    Precision,
+    function,
+    function_from_source,
+    native,
+    register,
+)
 from ..warp_internals import arguments as arguments_of
+from ..warp_internals import elements, native_name, vector
+
+BLOCK = 64  # members that a thread of the CPU takes
 
 
 def _evaluation(
@@ -103,41 +114,52 @@ def follow_kernel(
 
 @functools.cache
 def slope_kernel(
-    law: wp.Function, arguments: tuple[str, ...], by: int, precision: Precision, data: Any,
-    params: Any,
+    law: wp.Function, arguments: tuple[str, ...], by: int, own: bool, precision: Precision,
+    data: Any, params: Any,
 ) -> wp.Kernel:  # fmt: skip
-    """Kernel: slope += df/dv and own += f of each member, v the law's argument ``by``."""
+    """Kernel: f += law(...) and slope += df/dv of each member, v the law's argument ``by``; with
+    ``own`` that force is added to the sum of the implicit ones, too.
+    """
     slope = _slope(law, arguments, by, precision, data, params)
     evaluate = _evaluation(law, arguments, precision, data, params, None, force=True)
 
     @register
-    def particle_slope(
+    def particle_force_and_slope(
         first: int,
         members: wp.array(dtype=wp.int32),
         world: wp.array(dtype=wp.int32),
         parameters: wp.array(dtype=params),
         d: data,
+        f_io: wp.array(dtype=precision.vec3),
         slope_io: wp.array(dtype=precision.mat33),
         own_io: wp.array(dtype=precision.vec3),
     ):
         k = first + wp.tid()
         i = members[k]
         w = world[k]
+        f = evaluate(i, w, d.x[i], d, parameters[w])
+        f_io[i] = f_io[i] + f
         slope_io[i] = slope_io[i] + slope(i, w, d.x[i], d, parameters[w])
-        own_io[i] = own_io[i] + evaluate(i, w, d.x[i], d, parameters[w])
+        if wp.static(own):
+            own_io[i] = own_io[i] + f
 
-    return particle_slope
+    return particle_force_and_slope
 
 
 @functools.cache
 def force_kernel(
     law: wp.Function, arguments: tuple[str, ...], derived: int | None, precision: Precision,
-    data: Any, params: Any,
+    data: Any, params: Any, vectorised: bool,
 ) -> wp.Kernel:  # fmt: skip
-    """Kernel: f += law(...) on each member, or minus its derivative by argument ``derived``."""
-    evaluate = _evaluation(law, arguments, precision, data, params, derived, force=True)
+    """Kernel: f += law(...) on each member, or minus its derivative by argument ``derived``.
 
-    @register
+    A thread takes ``BLOCK`` members where it is vectorised, else one.
+    """
+    evaluate = _evaluation(law, arguments, precision, data, params, derived, force=True)
+    lanes = _lane_forces(evaluate, precision, data, params)
+    block = BLOCK if vectorised else 1
+
+    @functools.partial(register, cpu_only=vectorised)
     def particle_force(
         first: int,
         members: wp.array(dtype=wp.int32),
@@ -146,12 +168,53 @@ def force_kernel(
         d: data,
         f_io: wp.array(dtype=precision.vec3),
     ):
-        k = first + wp.tid()
-        i = members[k]
-        w = world[k]
-        f_io[i] = f_io[i] + evaluate(i, w, d.x[i], d, parameters[w])
+        begin = (first + wp.tid()) * wp.static(block)
+        end = wp.min(begin + wp.static(block), members.shape[0])
+        if wp.static(vectorised):
+            begin = lanes(begin, end, members, world, parameters, d, f_io)
+        for k in range(begin, end):
+            i = members[k]
+            w = world[k]
+            f_io[i] = f_io[i] + evaluate(i, w, d.x[i], d, parameters[w])
 
     return particle_force
+
+
+def _lane_forces(
+    evaluate: wp.Function, precision: Precision, data: Any, params: Any
+) -> wp.Function:
+    """``lanes(begin, end, ...) -> k``: forces of members in the CPU's lanes, and where to go on.
+
+    Of particles that follow one another, in one world; of others none.
+    """
+    vec3, c = precision.vec3, precision.c
+    snippet = f"""
+    const int* member = {elements("members", "int")} + begin;
+    const int w = {elements("world", "int")}[begin], count = end - begin, i_0 = member[0];
+    int apart = {elements("world", "int")}[end - 1] ^ w;
+    for (int l = 0; l < count; ++l) apart |= member[l] ^ (i_0 + l);
+    if (apart) return begin;
+    const {c}* x = {elements("d.x", c)} + 3 * (long long)i_0;
+    {c}* f_io = {elements("f", c)} + 3 * (long long)i_0;
+    const auto p = parameters.data[w];
+    alignas(64) {c} f_of[3][{BLOCK}];
+    for (int l = 0; l < count; ++l) {{
+        const {vector(3, c)} here(x[3 * l], x[3 * l + 1], x[3 * l + 2]);
+        const {vector(3, c)} force = {native_name(evaluate)}(i_0 + l, w, here, d, p);
+        f_of[0][l] = force[0]; f_of[1][l] = force[1]; f_of[2][l] = force[2];
+    }}
+    for (int l = 0; l < count; ++l)
+        for (int k = 0; k < 3; ++k) f_io[3 * l + k] += f_of[k][l];
+    return end;
+"""
+
+    def lane_forces(
+        begin: int, end: int, members: wp.array(dtype=wp.int32), world: wp.array(dtype=wp.int32),
+        parameters: wp.array(dtype=params), d: data, f: wp.array(dtype=vec3),
+    ) -> int:  # fmt: skip
+        evaluate(begin, begin, vec3(), d, parameters[begin])
+
+    return native(lane_forces, snippet)
 
 
 @functools.cache

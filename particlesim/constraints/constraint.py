@@ -19,6 +19,7 @@ from ..engine.probe import Probe
 from ..engine.state import State
 from ..kernels.constraints import constraints as kernels
 from ..kernels.constraints.constraint_force import virial_kernel
+from ..kernels.constraints.projection import BLOCK, project_kernel
 from ..scene.law import law as make_law
 from ..scene.part import ConstraintBase, Part
 from .force import ConstraintForce
@@ -194,31 +195,30 @@ class Constraint(ConstraintBase):
     def attach(self, model: Model, state: State) -> None:
         if not self.count:
             return
-        self.struct = self.tuples.struct(
-            inequality=self.inequality, breakable=self.break_force is not None
-        )
+        self.struct = self.tuples.struct()
         self.bodies = bodies(model, state)
-        self.scale = wp.zeros(1, dtype=wp.float64, device=model.device)
+        self.fresh = False  # whether the multipliers are yet to be made anew in this substep
         self.strain = wp.zeros_like(self.struct.lam)
         solved = self.tuples.solved(self, state)
-        self.project_kernel = kernels.project_kernel(solved)
+        self.project_kernel = project_kernel(solved, model.vectorised)
+        self.block = BLOCK if model.vectorised else 1
         self.strain_kernel = kernels.strain_kernel(solved)
         self.virial_kernel = virial_kernel(solved)
 
     def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if self.count and dt > 0:
-            reset = kernels.reset_kernel(self.model.precision)
-            inputs = [1.0 / dt, self.struct.lam, self.scale]
-            launch(reset, self.count, inputs, self.model.device)
+            self.fresh = True
 
     def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if not self.count or dt <= 0:
             return
         # Static projection: no time passes, and nothing moves of itself.
         own = 0.0 if math.isinf(dt) else dt
-        for start, rows in self.tuples.spans:
-            inputs = [start, self.model.box, self.struct, self.bodies, own, 1.0 / dt]
-            launch(self.project_kernel, rows, inputs, self.model.device)
+        scale = 1.0 / dt * (1.0 / dt) if self.fresh else -1.0
+        self.fresh = False
+        for start, end in self.tuples.spans:
+            inputs = [start, end, scale, self.model.box, self.struct, self.bodies, own, 1.0 / dt]
+            launch(self.project_kernel, end - start, inputs, self.model.device, self.block)
 
     def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if self.count and self.break_force is not None:
@@ -226,7 +226,7 @@ class Constraint(ConstraintBase):
 
     def _strain(self, may_break: bool) -> None:
         inputs = [
-            int(may_break), self.model.box, self.struct, self.bodies, self.scale, self.strain,
+            int(may_break), self.model.box, self.struct, self.bodies, self.strain,
         ]  # fmt: skip
         launch(self.strain_kernel, self.count, inputs, self.model.device)
 
@@ -235,7 +235,7 @@ class Constraint(ConstraintBase):
         if not self.count:
             return
         seats = self.tuples.seats
-        inputs = [seats, self.model.box, self.struct, self.bodies, self.scale, energy, virial]
+        inputs = [seats, self.model.box, self.struct, self.bodies, energy, virial]
         launch(self.virial_kernel, len(seats.particle), inputs, self.model.device)
 
     def limits(self, probe: Probe) -> list[Limit]:
@@ -251,7 +251,7 @@ class Constraint(ConstraintBase):
         return {"broken": self.struct.broken} if breakable else {}
 
     def readable(self) -> dict[str, wp.array]:
-        return {"lam": self.struct.lam, "scale": self.scale} if self.count else {}
+        return {"lam": self.struct.lam, "scale": self.struct.scale} if self.count else {}
 
     def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
         return self.tuples.world if len(array) == self.count and name != "scale" else None

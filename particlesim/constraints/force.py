@@ -66,7 +66,7 @@ class ConstraintForce(Interaction):
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
         self.tuples = Tuples(self.name, model, [peer.constraint for peer in self.peers])
-        self.conservative = not any(peer.constraint.damping.any() for peer in self.peers)
+        self.conservative = not self.tuples.damped
         self.seats = self.tuples.seats
         self.count = len(self.seats.particle)
 
@@ -74,7 +74,7 @@ class ConstraintForce(Interaction):
         if not self.count:
             return
         constraint, tuples = self.constraint, self.tuples
-        self.struct = tuples.struct(inequality=constraint.inequality, breakable=False)
+        self.struct = tuples.struct()
         self.bodies = bodies(model, state)
         solved = tuples.solved(constraint, state)
         self.force_kernel = kernels.force_kernel(solved)

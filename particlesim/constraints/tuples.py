@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -23,7 +24,7 @@ class Tuples:
     """The tuples of the peers of a constraint, one peer a world.
 
     Row r of the arrays is tuple ``order[r]`` in the order in which the worlds list theirs. Rows of
-    one colour follow each other and share no particle: ``spans`` holds (first row, rows) of each.
+    one colour follow each other and share no particle: ``spans`` holds (first, last + 1) of each.
     """
 
     def __init__(self, owner: str, model: Model, peers: Sequence[Any]):
@@ -34,14 +35,17 @@ class Tuples:
         color = _colors(each)
         self.order = np.argsort(color, kind="stable")
         rows = np.bincount(color) if self.count else np.zeros(0, dtype=np.int64)
-        starts = np.concatenate([[0], np.cumsum(rows)])
-        self.spans = [(int(start), int(n)) for start, n in zip(starts, rows, strict=False)]
+        self.spans = list(itertools.pairwise([0, *np.cumsum(rows).tolist()]))
         self.particles = particles[self.order]
         self.world = np.repeat(np.arange(len(each)), np.diff(self.edges))[self.order]
         columns = [peer.columns(model, w) for w, peer in enumerate(peers)]
+        self.damped = any(peer.damping.any() for peer in peers)
+        self.one_sided, self.breakable = peers[0].inequality, peers[0].break_force is not None
+        idle = {"damping": not self.damped, "break_force": not self.breakable}
         merged = {
             name: np.concatenate([part[name] for part in columns])[self.order]
             for name in columns[0]
+            if not idle.get(name)
         }
         model.fits(owner, merged)
         self.Item, self.items = model.parameters("ConstraintItem", merged)
@@ -57,7 +61,7 @@ class Tuples:
             return ""
         return self.model.unresolved(owner, "distances", self.shortest, self.particles)
 
-    def struct(self, *, inequality: bool, breakable: bool) -> Any:
+    def struct(self) -> Any:
         """The tuples as the kernels take them, with multipliers and, if breakable, marks."""
         model = self.model
         result = tuples_type(model.precision, self.size, self.Item)()
@@ -66,9 +70,9 @@ class Tuples:
         result.world = model.array(self.world.astype(np.int32), wp.int32)
         result.item = self.items
         result.lam = wp.zeros(self.count, dtype=model.precision.scalar, device=model.device)
-        if breakable:
+        result.scale = wp.zeros(1, dtype=wp.float64, device=model.device)
+        if self.breakable:
             result.broken = wp.zeros(self.count, dtype=wp.int32, device=model.device)
-        result.one_sided, result.breakable = int(inequality), int(breakable)
         return result
 
     def solved(self, constraint: Any, state: State) -> Solved:
@@ -77,6 +81,7 @@ class Tuples:
         return Solved(
             constraint.evaluation(model, self.Item), model.precision, model.periodic,
             "position_error" in state, self.size, self.Item, constraint.relative, constraint.unit,
+            self.damped, self.one_sided, self.breakable,
         )  # fmt: skip
 
     @functools.cached_property

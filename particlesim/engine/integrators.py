@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from .. import validate
-from ..kernels.engine.implicit import lead_kernel, settle_kernel
-from ..kernels.engine.integrate import (
-    integration_kernels,
-    motion_type,
-    tick_kernel,
-)
+from ..kernels.engine.implicit import implicit_kernels
+from ..kernels.engine.integrate import motion_type
+from ..kernels.engine.motion_kernels import integration_kernels, tick_kernel
 from ..scene.settings import INTEGRATORS, Settings
 from .execution.launch import launch
 from .limit import explicit_step, predicted_step
@@ -84,7 +81,9 @@ class Integrator:
             names |= {"image", "world"}
         self.predicted = predicted and forces and self.carries_forces
         if implicit:
-            names |= {"force_slope", "implicit_force", "velocity_lead"}
+            names |= {"force_slope", "velocity_lead"} | (
+                set() if self.damps else {"implicit_force"}
+            )
         if self.predicted:
             names |= {"half_velocity"} | (
                 {"half_velocity_error"} if settings.compensated else set()
@@ -92,8 +91,9 @@ class Integrator:
         state.require(names)
         self.forces, self.constrained = forces, constrained
         self.kernels = integration_kernels(
-            model.precision, model.periodic, forces, settings.compensated, constrained, remember
-        )
+            model.precision, model.periodic, forces, settings.compensated, constrained, remember,
+            model.vectorised,
+        )  # fmt: skip
         self.motion = _motion(model, state)
 
     @property
@@ -118,27 +118,31 @@ class Integrator:
         The same as v = (x - x_previous) / dt in exact arithmetic, without its cancellation.
         """
         if self.constrained and dt > 0:
-            self._launch(self.kernels.follow_corrections, 1.0 / dt)
+            self._launch_blocks(self.kernels.follow_corrections, 1.0 / dt)
 
     def lead(self, dt: float) -> None:
         """How far the velocity of the implicit forces is ahead, in ``state.velocity_lead``."""
-        self._implicitly(lead_kernel, dt)
+        self._implicitly("lead", dt, self.state.velocity_lead)
 
     def settle(self, dt: float) -> None:
         """The sum of all forces is what takes the velocity there."""
-        self._implicitly(settle_kernel, dt)
+        self._implicitly("settle", dt, self.state.velocity_lead)
 
-    def _implicitly(self, kernel: Any, dt: float) -> None:
+    def respond(self, dt: float) -> None:
+        """``lead`` and ``settle`` in one launch."""
+        self._implicitly("respond", dt)
+
+    def _implicitly(self, name: str, dt: float, *lead: Any) -> None:
         state, model = self.state, self.model
-        names = ("force_slope", "implicit_force", "velocity_lead")
-        inputs = [0.5 * dt, self.motion, *(state[name] for name in names)]
-        made = kernel(model.precision, self.damps, self.predicted)
-        launch(made, self.count, inputs, model.device)
+        own = None if self.damps else state.implicit_force
+        kernel = getattr(implicit_kernels(model.precision, self.damps, self.predicted), name)
+        inputs = [0.5 * dt, self.motion, state.force_slope, own, *lead]
+        launch(kernel, self.count, inputs, model.device)
 
     def kick(self, dt: float) -> None:
         """v += w f dt, w = 1/m; nothing in a scene without forces."""
         if self.forces:
-            self._launch(self.kernels.kick_only, dt)
+            self._launch_blocks(self.kernels.kick_only, dt)
 
     def drift(self, dt: float) -> None:
         """x += v dt, into the periodic box. The clock goes with the positions."""
@@ -146,10 +150,14 @@ class Integrator:
 
     def move(self, kick: float, drift: float) -> None:
         """v += w f kick; x += v drift, in one launch. The clock goes with the positions."""
-        self._launch(self.kernels.advance, kick, drift)
+        self._launch_blocks(self.kernels.advance, kick, drift)
         if "time" in self.state:
             model = self.model
             launch(tick_kernel(), model.world_count, [drift, self.state.time], model.device)
+
+    def _launch_blocks(self, kernel: Any, *scalars: float) -> None:
+        inputs, block = [*scalars, self.motion], self.kernels.block
+        launch(kernel, self.count, inputs, self.model.device, block)
 
     def _launch(self, kernel: Any, *scalars: float) -> None:
         launch(kernel, self.count, [*scalars, self.motion], self.model.device)

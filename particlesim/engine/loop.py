@@ -106,9 +106,12 @@ class Loop:
         """Forces that are implicit in the velocity follow it to where it will be in half a kick."""
         if not self.implicit:
             return
+        if not self.observers.all:
+            self.integrator.respond(dt)
+            return
         self.integrator.lead(dt)
         now = self.state, self.integrator.damps
-        for interaction in self.implicit if self.observers.all else ():  # who wants each part's own
+        for interaction in self.implicit:  # observers want each part's own
             self.observers.act(interaction, FOLLOW, interaction.follow, *now)
         self.integrator.settle(dt)
 

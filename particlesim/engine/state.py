@@ -23,7 +23,7 @@ FIELDS: dict[str, int | None] = {
     "half_velocity": 3,  # of half a substep, where that of its end is predicted for the forces
     "half_velocity_error": 3,
     "force_slope": 9,  # df/dv of the forces that are implicit in the velocity
-    "implicit_force": 3,  # their sum
+    "implicit_force": 3,  # their sum, where the method does not damp by all forces
     "velocity_lead": 3,  # how far ahead the velocity is that these are taken at
     "position_error": 3,  # what rounding has kept from x, compensated sums
     "velocity_error": 3,

@@ -43,7 +43,7 @@ def off(constraint: Constraint, sim: Source) -> tuple[np.ndarray, np.ndarray] | 
     if not constraint.count:
         return None
     kernel = kernels.off_kernel(constraint.tuples.solved(constraint, sim.state))
-    inputs = [sim.model.box, constraint.struct, constraint.bodies, constraint.scale]
+    inputs = [sim.model.box, constraint.struct, constraint.bodies]
     return _run(kernel, constraint.count, inputs, sim), constraint.tuples.world
 
 

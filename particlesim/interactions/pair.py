@@ -204,10 +204,10 @@ class PairPotential(Pair):
 class PairForce(Pair):
     """Pair force F(r) along the pair, given directly; positive repels.
 
-    A law whose first parameter is called ``distance_squared`` gets r^2 and gives F / r, which saves
-    a root and a quotient. Arguments as for :class:`PairPotential`. No energy is reported. A law that is another with i and
-    j exchanged, as ``charge_i * mass_j`` is, gives forces that are not opposite: i feels F of (i,
-    j), j feels F of (j, i), and momentum is not kept. A warning says so, once for each law.
+    Arguments as for :class:`PairPotential`; a law of ``distance_squared`` gives F / r. No energy is
+    reported. A law that is another with i and j exchanged, as ``charge_i * mass_j`` is, gives
+    forces that are not opposite: i feels F of (i, j), j feels F of (j, i), and momentum is not
+    kept. A warning says so, once for each law.
 
     Example:
         >>> @law

@@ -146,7 +146,9 @@ class ParticleForce(Interaction):
         self.data = filled(self.Data, fields)
         names = self.arguments[0].names
         derived = names.index("position") if self.law is None else None
-        self.kernel = kernels.force_kernel(*self._called(0), derived, *self._types)
+        vectorised = model.vectorised
+        self.kernel = kernels.force_kernel(*self._called(0), derived, *self._types, vectorised)
+        self.block = kernels.BLOCK if vectorised else 1
 
     @property
     def _types(self) -> tuple[Any, Any, Any]:
@@ -164,10 +166,12 @@ class ParticleForce(Interaction):
         return self.functions[k], tuple(called)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        self._launch(self.kernel, state.force)
-        if self.implicit:
-            kernel = kernels.slope_kernel(*self._called(0), self._by, *self._types)
-            self._launch(kernel, state.force_slope, state.implicit_force)
+        if not self.implicit:
+            self._launch(self.kernel, state.force, block=self.block)
+            return
+        own = state.implicit_force if "implicit_force" in state else None
+        kernel = kernels.slope_kernel(*self._called(0), self._by, own is not None, *self._types)
+        self._launch(kernel, state.force, state.force_slope, own)
 
     def follow(self, state: State, damps: bool) -> None:
         kernel = kernels.follow_kernel(*self._called(0), self._by, damps, *self._types)
@@ -177,9 +181,9 @@ class ParticleForce(Interaction):
     def _by(self) -> int:
         return self.arguments[0].names.index("velocity")
 
-    def _launch(self, kernel: wp.Kernel, *arrays: wp.array) -> None:
+    def _launch(self, kernel: wp.Kernel, *arrays: wp.array | None, block: int = 1) -> None:
         inputs = [self.members, self.world, self.params, self.data, *arrays]
-        launch(kernel, self.count, inputs, self.model.device)
+        launch(kernel, self.count, inputs, self.model.device, block)
 
     def complaint(self) -> str:
         """That the potential is not that of the force, that a law leaves the precision, or that it

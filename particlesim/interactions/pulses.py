@@ -57,5 +57,5 @@ def _forces(part: Any, times: np.ndarray) -> np.ndarray:
     rows = model.array(np.arange(n), wp.int32)
     force = wp.zeros(n, dtype=model.precision.vec3, device=model.device)
     inputs = [rows, rows, repeated(part.params, world), filled(part.Data, fields), force]
-    launch(part.kernel, n, inputs, model.device)
+    launch(part.kernel, n, inputs, model.device, part.block)
     return force.numpy().astype(np.float64)

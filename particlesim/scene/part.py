@@ -157,7 +157,8 @@ class Interaction(Part):
     cutoff: float | None = None
     reads_velocity: bool | None = None  # in any other way than that of ``follow``
     conservative: bool = False  # `measure` adds the potential of all that it does
-    # Adds its force to ``implicit_force`` too, df/dv to ``force_slope``, and has ``follow``.
+    # Adds its force to ``implicit_force`` too, where that is kept, df/dv to ``force_slope``, and
+    # has ``follow``.
     implicit: bool = False
 
     def apply(self, state: Any, neighbors: Any, dt: float) -> None:

@@ -85,8 +85,8 @@ def test_without_neighbours_there_is_no_list(device):
     assert found.conditional == []
     implicit = {"force_slope", "implicit_force", "velocity_lead"}  # in the velocity, as drag is
     assert set(found.arrays) == COMPENSATED | {"force", "inverse_mass", "mass"} | implicit
-    forces = ["particle_force", "particle_force", "particle_slope", "spring_force"]
-    assert kernels(found) == [*3 * ["zero_rows"], *forces, "lead", "settle", "advance"]
+    forces = ["particle_force", "particle_force_and_slope", "spring_force"]
+    assert kernels(found) == [*3 * ["zero_rows"], *forces, "respond", "advance"]
 
 
 def test_without_forces_of_velocity_nothing_is_implicit_or_predicted(device):
@@ -156,7 +156,7 @@ def test_the_report_reads(liquid, device):
         "position ",
         "12.0 B",
         "pair lists",
-        "a substep: 15 launches",
+        "a substep: 10 launches",
         "UniformGravity",
         "when neighbour lists are rebuilt",
         "execution: graph",

@@ -8,6 +8,7 @@ import pytest
 import warp as wp
 
 from particlesim.kernels import warp_internals as internals
+from particlesim.kernels import warp_native as inside
 from particlesim.kernels.precision import kernel, native
 
 # Packed launches --------------------------------------------------------------------------------
@@ -109,3 +110,45 @@ def test_arrays_in_native_code(precision):
     out = wp.zeros(2, dtype=vec3, device="cpu")
     wp.launch(pick_rows, 2, [v, table, out], device="cpu")
     assert out.numpy().tolist() == [[2.0, 5.0, 5.0], [5.0, 5.0, 5.0]]
+
+
+# Matrices and structs ---------------------------------------------------------------------------
+
+
+@wp.struct
+class Item:
+    """Numbers and a vector between them."""
+
+    before: wp.float64
+    side: wp.vec3d
+    after: wp.float64
+
+
+def test_native_code_reads_matrices_and_structs_number_by_number():
+    Two = wp.types.matrix((2, 3), wp.float64)
+    places = inside.numbers(Item)
+    assert places == ["before", "side.c[0]", "side.c[1]", "side.c[2]", "after"]
+    total = " + ".join(f"{n + 1} * given.data[0].{place}" for n, place in enumerate(places))
+
+    def sum_of(
+        given: wp.array(dtype=Item), m: wp.types.matrix((2, 3), wp.float64)
+    ) -> wp.float64: ...
+
+    snippet = f"""
+    {inside.matrix(2, 3, "double")} twice;
+    {inside.entry("twice", 1, 2)} = 2.0 * {inside.entry("m", 1, 2)};
+    return {total} + twice.data[1][2];
+"""
+    function = native(sum_of, snippet)
+
+    @kernel
+    def look(given: wp.array(dtype=Item), out: wp.array(dtype=wp.float64)):
+        m = Two()
+        m[1, 2] = wp.float64(50.0)
+        out[0] = function(given, m)
+
+    item = Item()
+    item.before, item.side, item.after = 1.0, wp.vec3d(2.0, 3.0, 4.0), 5.0
+    out = wp.zeros(1, dtype=wp.float64, device="cpu")
+    wp.launch(look, 1, [wp.array([item], dtype=Item, device="cpu"), out], device="cpu")
+    assert out.numpy().tolist() == [1.0 + 2 * 2.0 + 3 * 3.0 + 4 * 4.0 + 5 * 5.0 + 100.0]

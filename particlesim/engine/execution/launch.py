@@ -36,9 +36,15 @@ class Launch:
     inputs: Sequence[Any]
     device: Any
     owner: str = ""
+    block: int = 1  # rows that a thread takes
+
+    @property
+    def threads(self) -> int:
+        """How many there are, one for each block of rows."""
+        return -(-self.dim // self.block)
 
     def issue(self) -> None:
-        wp.launch(self.kernel, self.dim, [0, *self.inputs], device=self.device)
+        wp.launch(self.kernel, self.threads, [0, *self.inputs], device=self.device)
 
     def record(self, chunks: int = 1, least: int = CHUNK) -> list[Any]:
         """Commands with packed arguments: a chunk is the same launch from another first row.
@@ -47,17 +53,12 @@ class Launch:
             chunks: How many at most.
             least: Rows of a chunk.
         """
-        pieces = max(1, min(chunks, self.dim // least))
-        edges = [self.dim * k // pieces for k in range(pieces + 1)]
+        pieces = max(1, min(chunks, self.threads, self.dim // least))
+        edges = [self.threads * k // pieces for k in range(pieces + 1)]
+        spans = [(start, stop - start) for start, stop in itertools.pairwise(edges)]
         return [
-            wp.launch(
-                self.kernel,
-                stop - start,
-                [start, *self.inputs],
-                device=self.device,
-                record_cmd=True,
-            )
-            for start, stop in itertools.pairwise(edges)
+            wp.launch(self.kernel, n, [start, *self.inputs], device=self.device, record_cmd=True)
+            for start, n in spans
         ]
 
 
@@ -138,7 +139,7 @@ class _Recorder:
         rows = math.prod(dim) if isinstance(dim, Sequence) else int(dim)
         device = arguments.get("device")
         inputs = [*arguments.get("inputs", ()), *arguments.get("outputs", ())]
-        _now().add(Whole(arguments["kernel"], rows, inputs, device, _owner.get(), arguments))
+        _now().add(Whole(arguments["kernel"], rows, inputs, device, _owner.get(), 1, arguments))
 
     def call(self, run: Callable[[], None]) -> None:
         _now().add(Call(run))
@@ -195,7 +196,7 @@ def owner(name: str) -> Iterator[None]:
         yield
 
 
-def launch(kernel: Any, dim: int, inputs: Sequence[Any], device: Any) -> None:
+def launch(kernel: Any, dim: int, inputs: Sequence[Any], device: Any, block: int = 1) -> None:
     """Launch a kernel over ``dim`` rows: now, or each time that what is being recorded is run.
 
     This is how an interaction, a constraint or an integrator of your own runs a kernel in its
@@ -218,6 +219,7 @@ def launch(kernel: Any, dim: int, inputs: Sequence[Any], device: Any) -> None:
         dim: Rows; nothing happens for 0.
         inputs: What the kernel takes after ``first``: arrays, structs, numbers.
         device: Where the arrays are: ``model.device``.
+        block: Rows that a thread takes; what the kernel adds up is then the number of its block.
 
     Example:
         >>> @wp.kernel
@@ -234,7 +236,7 @@ def launch(kernel: Any, dim: int, inputs: Sequence[Any], device: Any) -> None:
         if program is not None:
             program.touched = True
         return
-    operation = Launch(kernel, dim, inputs, device, _owner.get())
+    operation = Launch(kernel, dim, inputs, device, _owner.get(), block)
     if program is not None:
         program.add(operation)
     else:

@@ -8,6 +8,8 @@ construction: a large world has hash grids of its own, one for each of its block
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import warp as wp
 
