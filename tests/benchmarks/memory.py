@@ -1,38 +1,53 @@
 """Memory of a particle: a liquid of a million atoms, and LAMMPS; water; grains.
 
 Bytes are those that the process holds beyond what it had when the libraries were loaded, of our
-programs with all compiled kernels and the scene itself in NumPy. `explain` says what the arrays and
-lists alone take.
+programs with all compiled kernels and the scene itself in NumPy. Beside them what `explain` says,
+of arrays and lists alone.
 """
 
-from lennard_jones import ours as liquid_of
 from peers import lammps
+from work.liquid import SETTINGS as LIQUID
+from work.liquid import liquid
 from work.water import SETTINGS as WATER
-from work.water import water
+from work.water import STEP, water
 
 import particlesim as ps
 from particlesim.accuracy.bench.case import Case, Entry, Simulated
+
+
+def explained(sim: ps.Simulation) -> dict[str, float]:
+    """Bytes a particle of arrays and lists."""
+    return {"explained": sim.explain().bytes_per_particle}
+
+
+def dry(count: int, precision: str) -> Entry:
+    """A liquid of atoms."""
+
+    def start(place):
+        settings = LIQUID.replace(precision=precision, threads=place.threads)
+        return Simulated(ps.Simulation(liquid(count), settings, device=place.device), 1, explained)
+
+    return Entry(start, precision)
 
 
 def wet(side: int) -> Entry:
     """Water."""
 
     def start(place):
-        settings = WATER.replace(threads=place.threads, substeps=1)
-        return Simulated(ps.Simulation(water(side), settings, device=place.device))
+        settings = WATER.replace(threads=place.threads, dt=STEP, substeps=1)
+        return Simulated(ps.Simulation(water(side), settings, device=place.device), 1, explained)
 
     return Entry(start)
 
 
 def case(count: int = 1_000_000, side: int = 80) -> Case:
     """``count``: atoms; ``side``: particles of water along an edge."""
-    built_in = ps.LennardJones(cutoff=2.5)
     return Case(
         title=f"{count:,} atoms, and {side**3:,} particles of water",
         unit="particle-substeps",
         ours={
-            "liquid": liquid_of(count, built_in, "float32", 1),
-            "liquid, float64": liquid_of(count, built_in, "float64", 1),
+            "liquid": dry(count, "float32"),
+            "liquid, float64": dry(count, "float64"),
             "water": wet(side),
         },
         peers={"LAMMPS": lammps.melt(count, 1)},

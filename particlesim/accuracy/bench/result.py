@@ -11,7 +11,7 @@ from ..table import amount, duration
 from .case import Case
 from .row import Row
 
-MANY = 10_000  # particles from which memory is theirs, and not the program's
+MANY = 500_000  # particles from which memory is theirs, and not that of compiled code
 
 
 @dataclass(frozen=True, repr=False)
@@ -60,7 +60,7 @@ class Result(Report):
 
     def __str__(self) -> str:
         heads = ["", "precision", "cores", "a block", f"{self.case.unit}/s", "spread", "CPU",
-                 "ratio", "B/particle", *self.case.agree]  # fmt: skip
+                 "ratio", "B/particle", *self._answers]  # fmt: skip
         sides = ["left", "left", *["right"] * (len(heads) - 2)]
         lines = [f"{self.name}: {self.case.title}; {self.device}", ""]
         lines += grid(zip(heads, sides, strict=True), [self._cells(row) for row in self.finished])
@@ -78,6 +78,12 @@ class Result(Report):
             lines += [f"not installed: {', '.join(self.missing)}"]
         return "\n".join(lines)
 
+    @property
+    def _answers(self) -> list[str]:
+        """Names of all answers, first those that are to agree."""
+        given = [key for row in self.finished for key in row.answers]
+        return list(dict.fromkeys([*self.case.agree, *given]))
+
     def _cells(self, row: Row) -> list[str]:
         first = self._first(row)
         return [
@@ -90,7 +96,7 @@ class Result(Report):
             duration(row.cpu),
             "-" if first is None else f"{row.times(first):.2f}",
             f"{row.memory / row.particles:.0f}" if row.particles >= MANY else "-",
-            *(_shown(row.answers.get(key)) for key in self.case.agree),
+            *(_shown(row.answers.get(key)) for key in self._answers),
         ]
 
     def _agreement(self) -> str:
