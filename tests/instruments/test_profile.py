@@ -23,8 +23,11 @@ def drops(count=600):
 @pytest.mark.parametrize("threads", [1, 2])
 def test_the_bits_are_those_of_a_plain_run(liquid, device, threads):
     settings = ps.Settings(dt=0.02, substeps=4, threads=threads)
-    for scene in (liquid(cells=7), drops()):  # 1372 atoms: enough to be shared by threads
-        plain, profiled = (ps.Simulation(scene, settings, device=device) for _ in range(2))
+    # 1372 atoms are enough to be shared by threads.
+    for scene, worlds in ((liquid(cells=7), 1), (drops(), 2)):
+        plain, profiled = (
+            ps.Simulation(scene, settings, device=device, worlds=worlds) for _ in range(2)
+        )
         for _ in range(6):
             plain.step()
         found = profiled.profile(6)

@@ -7,7 +7,7 @@ import numpy as np
 import particlesim as ps
 
 SOFTENING, STEP = 0.02, 0.002
-SETTINGS = ps.Settings(dt=STEP, substeps=1, integrator="velocity_verlet")
+SETTINGS = ps.Settings(dt=STEP, substeps=1, integrator="velocity_verlet", execution="threads")
 SLAB = 512  # bodies whose distances are held at once
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import particlesim as ps
 
 SPACING, MASS, COMPLIANCE, GRAVITY = 0.01, 2e-5, 1e-7, 9.81  # [m], [kg], [m/N], [m/s^2]
-SETTINGS = ps.Settings(dt=1 / 60, substeps=10)
+SETTINGS = ps.Settings(dt=1 / 60, substeps=10, execution="threads")
 
 
 def knots(side: int):

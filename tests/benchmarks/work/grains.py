@@ -8,7 +8,7 @@ import particlesim as ps
 
 RADIUS = 0.05  # [m]
 GRAVITY = 9.81
-SETTINGS = ps.Settings(dt=1 / 60, substeps=20)
+SETTINGS = ps.Settings(dt=1 / 60, substeps=20, execution="threads")
 
 
 def places(side: int) -> np.ndarray:

@@ -12,7 +12,7 @@ SMOOTHING_LENGTH = SPACING  # support 2 h: 30 neighbours
 SOUND_SPEED = 40.0  # [m/s], ten times sqrt(2 g H), the speed of a fall from the column's height
 STEP = 0.3 * SMOOTHING_LENGTH / SOUND_SPEED
 GRAVITY, VISCOSITY = 9.81, 0.05
-SETTINGS = ps.Settings(dt=20 * STEP, substeps=20)
+SETTINGS = ps.Settings(dt=20 * STEP, substeps=20, execution="threads")
 
 
 @ps.law
