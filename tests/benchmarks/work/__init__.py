@@ -1,1 +1,1 @@
-"""The work that cases and other programs share: scenes, their settings, and what is asked of them."""
+"""The work that cases and other programs share: scenes, settings, and what is asked at the end."""
