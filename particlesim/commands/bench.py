@@ -11,7 +11,7 @@ import typer
 from .. import validate
 from ..output.progress import Meter
 from .scene_files import parse_options
-from .shell import Debug, Options, Overwrite, opened, start_warp
+from .shell import Debug, Overwrite, opened, start_warp
 
 if TYPE_CHECKING:
     from ..accuracy.bench.result import Result
@@ -19,32 +19,40 @@ if TYPE_CHECKING:
 OWNER = "bench"
 
 
+Names = Annotated[
+    list[str] | None, typer.Argument(metavar="NAME", help="Cases. Default: all of them.")
+]
+ShowList = Annotated[bool, typer.Option("--list", help="List the cases, and run none.")]
+Peers = Annotated[
+    bool, typer.Option("--peers", help="Race other programs too, where they are installed.")
+]
+BenchDevice = Annotated[str, typer.Option(help="cpu, cuda or cuda:N; peers stay on the CPU.")]
+Threads = Annotated[
+    str | None, typer.Option(metavar="N,...", help="Cores for each, peers too. Default: all.")
+]
+Repeats = Annotated[int | None, typer.Option(min=1, help="Timed blocks. Default: the case's own.")]
+CaseOptions = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="Set an option of the case; repeat."),
+]
+JsonFile = Annotated[
+    Path | None, typer.Option("--json", metavar="FILE", help="File to write all figures to.")
+]
+Folder = Annotated[
+    Path | None, typer.Option(help="Folder of cases. Default: tests/benchmarks of a checkout.")
+]
+
+
 def bench(
-    names: Annotated[
-        list[str] | None, typer.Argument(metavar="NAME", help="Cases. Default: all of them.")
-    ] = None,
-    show_list: Annotated[
-        bool, typer.Option("--list", help="List the cases, and run none.")
-    ] = False,
-    peers: Annotated[
-        bool, typer.Option("--peers", help="Race other programs too, where they are installed.")
-    ] = False,
-    device: Annotated[
-        str, typer.Option(help="cpu, cuda or cuda:N; peers stay on the CPU.")
-    ] = "cpu",
-    threads: Annotated[
-        str | None, typer.Option(metavar="N,...", help="Cores for each, peers too. Default: all.")
-    ] = None,
-    repeats: Annotated[
-        int | None, typer.Option(min=1, help="Timed blocks. Default: the case's own.")
-    ] = None,
-    options: Options = None,
-    save: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="File to write all figures to.")
-    ] = None,
-    folder: Annotated[
-        Path | None, typer.Option(help="Folder of cases. Default: tests/benchmarks of a checkout.")
-    ] = None,
+    names: Names = None,
+    show_list: ShowList = False,
+    peers: Peers = False,
+    device: BenchDevice = "cpu",
+    threads: Threads = None,
+    repeats: Repeats = None,
+    options: CaseOptions = None,
+    save: JsonFile = None,
+    folder: Folder = None,
     overwrite: Overwrite = False,
     debug: Debug = False,
 ) -> None:
@@ -65,7 +73,9 @@ def bench(
             validate.choice(OWNER, "NAME", name, list(there))
         if save is not None:
             consent = "give --overwrite"
-            check_new(OWNER, save, overwrite, suffixes=(".json",), consent=consent)
+            check_new(
+                OWNER, save, overwrite, argument="--json", suffixes=(".json",), consent=consent
+            )
         facts = machine()
         typer.echo(describe(facts))
         asked = {

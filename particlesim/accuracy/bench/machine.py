@@ -15,6 +15,8 @@ import warp as wp
 
 from ...engine.execution.executors import available_threads
 
+BUSY = 0.25  # load a core, before anything has started, from which figures are worth little
+
 
 def machine() -> dict[str, Any]:
     """Processor, cores, system, devices and versions."""
@@ -31,14 +33,17 @@ def machine() -> dict[str, Any]:
 
 
 def describe(facts: dict[str, Any]) -> str:
-    """The machine in a line or two."""
+    """The machine in a few lines."""
     versions = ", ".join(f"{name} {version}" for name, version in facts["versions"].items())
     devices = "".join(f", {each}" for each in facts["devices"])
     load = "" if facts["load"] is None else f", load {facts['load']:.1f} at the start"
-    return (
-        f"{facts['processor']}, {facts['cores']} cores{devices}{load}\n"
-        f"Python {facts['python']}, {versions}"
-    )
+    lines = [
+        f"{facts['processor']}, {facts['cores']} cores{devices}{load}",
+        f"Python {facts['python']}, {versions}",
+    ]
+    if (facts["load"] or 0.0) > BUSY * facts["cores"]:
+        lines.append("others are at work here: threads that wait for each other suffer most")
+    return "\n".join(lines)
 
 
 def _processor() -> str:
