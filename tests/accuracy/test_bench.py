@@ -1,13 +1,16 @@
 """Benchmarks: what is made of the times, and the cases themselves at small sizes."""
 
 import math
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from particlesim.accuracy.bench.case import Case, Entry, Place
+from particlesim.accuracy.bench.case import Case, Command, Entry, Place
 from particlesim.accuracy.bench.files import cases_in, load_case, title_of
+from particlesim.accuracy.bench.race import race
 from particlesim.accuracy.bench.result import Result
 from particlesim.accuracy.bench.row import Row
 from particlesim.accuracy.stopwatch import Span, Stopwatch
@@ -28,6 +31,16 @@ SMALL = {
     "wcsph": {"side": 5},
     "wcsph_splash": {"side": 5, "start": 0.003},
     "worlds": {"worlds": 3, "frames": 1},
+}
+# With other programs: as many particles as the answers of a case need to agree.
+WITH_PEERS = {
+    "cloth": {"side": 11},
+    "gravity": {"count": 500, "steps": 5},
+    "grains": {"side": 8},
+    "lennard_jones": {"count": 2048, "frames": 10},
+    "memory": {"count": 2048, "side": 5},
+    "wcsph": {"side": 16, "frames": 1},
+    "wcsph_splash": {"side": 16, "start": 0.1, "frames": 1},
 }
 PROCESSES = {"dam_break", "startup"}
 
@@ -114,6 +127,34 @@ def test_the_cases_run(name):
     assert all(each.needs for each in case.peers.values())
 
 
-def test_a_case_knows_its_options(refused):
+def test_a_command_is_a_whole_process_with_an_empty_cache_if_it_is_cold():
+    look = "import os, sys; sys.exit(len(os.listdir(os.environ['WARP_CACHE_PATH'])))"
+    Command([sys.executable, "-c", look], cold=True).advance()
+    with pytest.raises(subprocess.CalledProcessError):
+        Command([sys.executable, "-c", "raise SystemExit(3)"]).advance()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WITH_PEERS)
+def test_other_programs_find_the_same(name):
+    """Those that are installed; at sizes at which the cases' tolerances hold."""
+    asked = {"threads": [1], "device": "cpu", "peers": True, "repeats": 1}
+    found = race(FOLDER / f"{name}.py", WITH_PEERS[name], **asked)
+    if not found.versions:
+        pytest.skip(f"none is installed of {', '.join(found.missing)}")
+    assert found.good, str(found)
+
+
+@pytest.mark.slow
+def test_whole_processes_run():
+    for name, options in {"dam_break": {"frames": 2, "spacing": 0.1}, "startup": {}}.items():
+        case = load_case(FOLDER / f"{name}.py", options)
+        for entry in case.ours.values():
+            running = entry.start(Place(1, "cpu"))
+            running.advance()
+            assert all(math.isfinite(value) for value in running.answers().values())
+
+
+def test_a_case_knows_its_options():
     with pytest.raises(TypeError, match="side"):
         load_case(FOLDER / "cloth.py", {"sid": 3})
