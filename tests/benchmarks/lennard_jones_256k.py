@@ -3,6 +3,6 @@
 import lennard_jones
 
 
-def case(count: int = 256_000, frames: int = 5):
+def case(count: int = 256_000, frames: int = 40):
     """See lennard_jones.py."""
     return lennard_jones.case(count, frames)

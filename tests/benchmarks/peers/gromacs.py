@@ -74,7 +74,10 @@ class Melt(Running):
         )  # fmt: skip
         log = (self.folder / "md.log").read_text(errors="replace")
         self.found = _energies(log)
-        return float(re.search(r"Time:\s+\S+\s+(\S+)", log).group(1))
+        # Its own clock, which leaves out the start; nor does the end count, which is written here
+        # only to go on from.
+        whole = float(re.search(r"Time:\s+\S+\s+(\S+)", log).group(1))
+        return whole - float(re.search(r"Write traj\.(?:\s+\d+){3}\s+(\S+)", log).group(1))
 
     def answers(self) -> dict[str, float]:
         return {
