@@ -25,6 +25,7 @@ from ..engine.report import Report, grid
 from ..scene.settings import Settings
 from .explain import kernel_name
 
+LEAST = 1000  # bytes that are worth a word
 PIECES = 4  # for each thread, of a launch that is shared
 
 
@@ -88,8 +89,8 @@ class Profile(Report):
                     [
                         each.owner, each.name, f"{each.launches / frames:.3g}",
                         f"{each.seconds / frames * 1e3:.3f} ms", _share(each.seconds, total),
-                        f"{each.bytes / 1e6:.3g} MB" if each.bytes else "-",
-                        f"{rate:.3g} GB/s" if each.bytes else "-",
+                        f"{each.bytes / 1e6:.3g} MB" if each.bytes >= LEAST else "-",
+                        f"{rate:.3g} GB/s" if each.bytes >= LEAST else "-",
                     ]
                 )  # fmt: skip
         between, outside = self.in_frames - self.in_passes, self.seconds - self.in_frames
