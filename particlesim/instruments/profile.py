@@ -87,7 +87,7 @@ class Profile(Report):
                 rate = each.bytes * each.launches / max(each.seconds, 1e-12) / 1e9
                 rows.append(
                     [
-                        each.owner, each.name, f"{each.launches / frames:.3g}",
+                        each.owner, each.name, f"{round(each.launches / frames, 1):g}",
                         f"{each.seconds / frames * 1e3:.3f} ms", _share(each.seconds, total),
                         f"{each.bytes / 1e6:.3g} MB" if each.bytes >= LEAST else "-",
                         f"{rate:.3g} GB/s" if each.bytes >= LEAST else "-",
