@@ -16,6 +16,7 @@ from .constraints.force import ConstraintForce
 from .engine.execution.launch import launch
 from .engine.integrators import Integrator
 from .instruments.ledger.ledger import Ledger
+from .instruments.profile import Profile
 from .instruments.stability import Stability, StabilityWarning
 from .instruments.watchdog.incident import Incident, SimulationError, SimulationWarning
 from .interactions.fluid.equations_of_state import EquationOfState, Polytrope, Tait
@@ -69,6 +70,7 @@ __all__ = [
     "ParticleForce",
     "PlaneBoundary",
     "Polytrope",
+    "Profile",
     "Scene",
     "Settings",
     "Simulation",

@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 
 from .commands import measure, run
+from .commands.bench import bench
 from .commands.number import measure as measure_number
 from .commands.render import render
 from .commands.shell import complain
@@ -62,6 +63,7 @@ app.command()(measure.tradeoff)
 app.command()(measure.tune)
 app.command()(measure.stress)
 app.command("measure")(measure_number)
+app.command()(bench)
 app.command()(render)
 app.command()(view)
 app.command()(run.plot)

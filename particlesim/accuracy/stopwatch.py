@@ -22,6 +22,38 @@ except ImportError:  # not on Windows: there no pass is known to be disturbed
 BLOCK = 1e-3  # seconds of a block: less than a slice of time that the system gives away
 
 
+@dataclass(frozen=True)
+class Span:
+    """What something took: wall seconds, CPU seconds of all threads and of ended child processes,
+    and how often one of them had to give its processor away."""
+
+    wall: float
+    cpu: float
+    switches: int
+
+
+class Stopwatch:
+    """Runs from when it is made."""
+
+    def __init__(self) -> None:
+        self._start = self._now()
+
+    def read(self) -> Span:
+        """The time since."""
+        now, start = self._now(), self._start
+        return Span(now.wall - start.wall, now.cpu - start.cpu, now.switches - start.switches)
+
+    def _now(self) -> Span:
+        cpu, switches = time.process_time(), 0
+        if resource is not None:
+            own, ended = (
+                resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+            )
+            cpu += ended.ru_utime + ended.ru_stime
+            switches = own.ru_nivcsw + ended.ru_nivcsw
+        return Span(time.perf_counter(), cpu, switches)
+
+
 @dataclass
 class Pass:
     """One pass over the frames: of each block wall and CPU seconds, and whether it was disturbed.
@@ -37,19 +69,15 @@ class Pass:
     def time(self, sim: Any, frames: int) -> None:
         """Advance by a block of frames."""
         wp.synchronize_device(sim.device)
-        switches, cpu, wall = _switches(), time.process_time(), time.perf_counter()
+        watch = Stopwatch()
         for _ in range(frames):
             sim.step()
         wp.synchronize_device(sim.device)
-        self.wall.append(time.perf_counter() - wall)
-        self.cpu.append(time.process_time() - cpu)
-        self.disturbed.append(_switches() != switches)
+        span = watch.read()
+        self.wall.append(span.wall)
+        self.cpu.append(span.cpu)
+        self.disturbed.append(span.switches > 0)
         self.frames += frames
-
-
-def _switches() -> int:
-    """How often a thread of this process had to give its processor away."""
-    return 0 if resource is None else resource.getrusage(resource.RUSAGE_SELF).ru_nivcsw
 
 
 def undisturbed(own: list[Pass], every: list[Pass]) -> tuple[float, float]:

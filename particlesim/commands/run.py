@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import math
 import shlex
 from pathlib import Path
@@ -73,6 +74,10 @@ Resume = Annotated[
 Ledger = Annotated[
     bool, typer.Option("--ledger", help="Print the work and impulse of every part at the end.")
 ]
+Profile = Annotated[
+    bool,
+    typer.Option("--profile", help="Print what each pass took at the end; runs launch by launch."),
+]
 
 
 def list_scenes(debug: Debug = False) -> None:
@@ -109,6 +114,7 @@ def run(
     checkpoint_every: CheckpointEvery = None,
     resume: Resume = False,
     ledger: Ledger = False,
+    profile: Profile = False,
     overwrite: Overwrite = False,
     debug: Debug = False,
 ) -> None:
@@ -130,7 +136,8 @@ def run(
             every=every, groups=groups, layout=_steps(layout), color_by=color_by, surface=surface,
             instancer=instancer,
         )  # fmt: skip
-        with meter.measure(label(module), sim, wanted) as progress:
+        profiling = sim.profiling() if profile else contextlib.nullcontext()
+        with meter.measure(label(module), sim, wanted) as progress, profiling as profiled:
             sim.run(
                 frames=wanted, record=None if out is None else str(out), progress=progress,
                 overwrite=overwrite, fields=fields or (), history=history,
@@ -143,8 +150,8 @@ def run(
         error = module.error(sim) if known else math.nan  # nan: nothing is known of this moment
         told = [meter.summary(), *([] if math.isnan(error) else [f"error {error:.3g}"])]
         typer.echo("; ".join([*told, *([] if out is None else [f"written to {out}"])]))
-        if ledger:
-            typer.echo(str(sim.ledger()))
+        for report in ([sim.ledger()] if ledger else []) + ([profiled] if profile else []):
+            typer.echo(f"\n{report}")
         _suggest(out)
 
 

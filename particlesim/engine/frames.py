@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -10,9 +11,10 @@ import warp as wp
 from .. import validate
 from ..kernels.instruments.watchdog import peak_kernel
 from ..scene.part import Interaction
+from ..scene.settings import Settings
 from .execution.acting import record_acts
 from .execution.executors import Executor
-from .execution.launch import Frame, Program, launch, record
+from .execution.launch import Frame, Program, launch, owner, record
 from .loop import Loop
 from .snapshot import Snapshot
 from .state import State
@@ -28,6 +30,19 @@ class Guard(Protocol):
         """What was seen is void: the frame is done again."""
 
 
+class Runner(Protocol):
+    """Who runs a frame, as an :class:`~.execution.executors.Executor` does."""
+
+    frame: Frame
+    chosen: Any
+
+    def run(self) -> None:
+        """Run it once."""
+
+    def close(self) -> None:
+        """End what runs beside."""
+
+
 class Frames:
     """The ways a loop's frame is run, by its number of substeps.
 
@@ -39,10 +54,11 @@ class Frames:
     def __init__(self, loop: Loop, guard: Guard):
         self.loop, self.guard = loop, guard
         self.snapshot = Snapshot(loop)
-        self._executors: dict[int, Executor] = {}
+        self.runner: Callable[[Frame, Settings, Any], Runner] = Executor  # makes who runs a frame
+        self._executors: dict[int, Runner] = {}
         self._generation = 0
 
-    def executor(self, substeps: int) -> Executor:
+    def executor(self, substeps: int) -> Runner:
         """What runs a frame of so many substeps; made on first use."""
         generation = self.loop.neighbors.generation
         if self._generation != generation:
@@ -92,9 +108,9 @@ class Frames:
         self.snapshot.restore()
         self.guard.forget()
 
-    def _new(self, substeps: int, peak: wp.array | None = None) -> Executor:
+    def _new(self, substeps: int, peak: wp.array | None = None) -> Runner:
         frame = self._record(substeps, peak)
-        return Executor(frame, self.loop.settings, self.loop.model.device)
+        return self.runner(frame, self.loop.settings, self.loop.model.device)
 
     def _record(self, substeps: int, peak: wp.array | None) -> Frame:
         """A frame of so many substeps; ``peak``: where to note the largest speeds."""
@@ -107,7 +123,7 @@ class Frames:
                 kernel = peak_kernel(model.precision)
                 launch(kernel, model.particle_count, [state.velocity, peak], model.device)
 
-        with record(frame.before):
+        with record(frame.before), owner("snapshot"):
             self.snapshot.take()
         frame.substep = record_acts(loop.actors, substep)
         self._refuse_idle(frame.substep)

@@ -96,7 +96,8 @@ class Loop:
 
     def forces(self, dt: float) -> None:
         """Interactions add forces at the present positions."""
-        self.neighbors.update(self.state)
+        with owner("pair lists"):
+            self.neighbors.update(self.state)
         self.state.clear_forces()
         now = self.state, self.neighbors, dt
         for interaction in self.passes:
@@ -119,7 +120,8 @@ class Loop:
         """Constraints project the positions, one after the other, in each iteration."""
         if not self.constraints:
             return
-        self.neighbors.update_for_constraints(self.state)
+        with owner("pair lists"):
+            self.neighbors.update_for_constraints(self.state)
         now = self.state, self.neighbors, dt
         for constraint in self.constraints:
             with owner(constraint.name):

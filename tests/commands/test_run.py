@@ -117,5 +117,12 @@ def test_a_run_is_resumed(falling, tmp_path, capsys, particlesim_fails):
     assert "--overwrite" in particlesim_fails(2, *words, "--resume", "--overwrite")
 
 
+def test_run_says_where_its_time_went(falling, capsys):
+    assert cli.main(["run", falling, "--device", "cpu", "--profile"]) == 0
+    out = capsys.readouterr().out
+    assert "error" in out  # that of a run without it, known to round-off
+    assert "2 frames, launch by launch" in out and "UniformGravity" in out
+
+
 def test_run_refuses_a_device_that_is_not_there(falling, particlesim_fails):
     assert "abacus" in particlesim_fails(2, "run", falling, "--device", "abacus")

@@ -141,7 +141,7 @@ def test_the_numbers_are_those_of_the_arrays(method, liquid, precision, device):
     assert found.launches_per_substep == len(found.launches)
     recorded = [operation.dim for operation in sim.executor.frame.substep.launches()]
     assert sorted(recorded) == sorted(rows for _, _, rows in [*found.launches, *found.conditional])
-    assert {owner for owner, _, _ in found.launches} == {"loop", "LennardJones"}
+    assert {owner for owner, _, _ in found.launches} == {"loop", "pair lists", "LennardJones"}
 
 
 def test_the_report_reads(liquid, device):
