@@ -228,7 +228,7 @@ class Contact(EasedConstraint):
 
     def _sum(self, kernel: wp.Kernel, params: wp.array, data: Any, out: Any) -> None:
         inputs = [self.pairs.pairs, self.model.box, params, data, out]
-        launch(kernel, self.pairs.rows, inputs, self.model.device)
+        self.pairs.sum(kernel, inputs)
 
     def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
         passes = self.passes[min(self.sweep, 1)] if self.count and dt > 0 else []

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..engine.execution.launch import launch
 from ..engine.limit import Limit, explicit_step
 from ..engine.model import filled
 from ..engine.probe import Probe
@@ -156,7 +157,10 @@ def forces(part: Any, probe: Probe, w: int, couples: np.ndarray, r: np.ndarray) 
         fields[name] = model.array(source.numpy()[particle], source.dtype)
     f = wp.zeros(2 * count, dtype=precision.vec3, device=model.device)
     rows = count if model.vectorised else 2 * count
-    listed = SimpleNamespace(pairs=pairs, rows=rows, partners=part.pairs.partners)
+    listed = SimpleNamespace(
+        pairs=pairs, partners=part.pairs.partners,
+        sum=lambda kernel, inputs: launch(kernel, rows, inputs, model.device),
+    )  # fmt: skip
     loop = replace(part.loop, pairs=listed, data=filled(part.loop.Data, fields))
     loop.sum(part.term, add_force, {"f": f})
     values = f.numpy()[1::2, 0].astype(np.float64).reshape(len(couples), len(r))

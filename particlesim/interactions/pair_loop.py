@@ -10,7 +10,6 @@ import numpy as np
 import warp as wp
 
 from .. import validate
-from ..engine.execution.launch import launch
 from ..engine.model import Model, filled, structure_of
 from ..kernels.engine.loops import Term
 from ..kernels.interactions.pair import pair_kernel
@@ -68,7 +67,7 @@ class PairLoop:
             model.precision, model.periodic, self.pairs.partners, model.vectorised,
         )  # fmt: skip
         inputs = [self.pairs.pairs, model.box, self.params, self.data, filled(Out, out)]
-        launch(kernel, self.pairs.rows, inputs, model.device)
+        self.pairs.sum(kernel, inputs)
 
 
 def squared_distances(owner: str, model: Model, cutoff: np.ndarray | None) -> dict[str, np.ndarray]:

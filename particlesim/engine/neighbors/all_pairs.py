@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,10 @@ class AllPairs:
         self.pairs.begin = model.array(self.begin_host, wp.int32)
         self.pairs.end = model.array(self.end_host, wp.int32)
         self.slots = model.array(np.arange(self.count), wp.int32)
-        self.rows = 0  # of a pass over it: clusters of slots
+        self.rows, self.block = (
+            0,
+            1,
+        )  # clusters of a pass over it, and at most so many slots in each
         self.users: list[str] = []
         # By world: whether it renews the list before interactions, and before constraints.
         self.for_interactions, self.for_constraints = np.zeros((2, model.world_count), dtype=bool)
@@ -48,7 +52,7 @@ class AllPairs:
     def _set_clusters(self, lead: np.ndarray) -> None:
         """Clusters of slots that begin here; at the end the first slot of one more."""
         model, sizes = self.model, np.diff(lead)
-        self.rows, self.of_cluster = len(sizes), sizes
+        self.rows, self.of_cluster, self.block = len(sizes), sizes, int(sizes.max(initial=1))
         self.pairs.lead = model.array(lead, wp.int32)
         self.pairs.cluster = model.array(np.repeat(np.arange(len(sizes)), sizes), wp.int32)
 
@@ -92,6 +96,10 @@ class AllPairs:
                 [self.order, state[name], target],
                 self.model.device,
             )
+
+    def sum(self, kernel: wp.Kernel, inputs: Sequence[Any]) -> None:
+        """Launch a sum over the partners of every slot, by clusters."""
+        launch(kernel, self.rows * self.block, inputs, self.model.device, self.block)
 
     def array(self, dtype: Any) -> wp.array:
         """A new array over the slots, and one entry behind them that may be read."""

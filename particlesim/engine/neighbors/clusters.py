@@ -160,18 +160,16 @@ class ClusterRows:
                 device,
             )  # fmt: skip
         launch(attics_kernel(), model.world_count, [listed.moved, self.attic.taken], device)
-        launch(
-            halve.supers,
-            self.super_count,
-            [listed.moved, self.columns, model.box, self.supers, listed.order, self.planes],
-            device,
-        )
+        slots = self.super_count * SUPER
+        inputs = [listed.moved, self.columns, model.box, self.supers, listed.order, self.planes]
+        launch(halve.supers, slots, inputs, device, SUPER)
         launch(
             partners_kernel(model.precision, model.periodic),
-            self.super_count,
+            slots,
             [listed.moved, model.box, listed.struct, self.columns, self.starts, self.supers,
              self.attic, self.planes, listed.pairs, listed.found, listed.overflow],
             device,
+            SUPER,
         )  # fmt: skip
 
     def _sort(self, k: int) -> None:
