@@ -64,16 +64,22 @@ def _laws(n: int, m: int) -> tuple[Law, Law]:
 
 @functools.cache
 def _even_laws(n: int, m: int) -> tuple[Law, Law]:
-    """The same for even exponents, by the square of the distance: potential, and force over r."""
+    """By the square of the distance, for even exponents and an unshifted force: u and F / r."""
     power_n, power_m = _power(n // 2), _power(m // 2)
 
     @law
-    def mie_squared(distance_squared: float, strength: float, sigma: float, u_cut: float):
+    def mie_squared(
+        distance_squared: float, strength: float, sigma: float, u_cut: float, f_cut: float,
+        cut: float,
+    ):  # fmt: skip
         s = sigma * sigma / distance_squared
         return strength * (power_n(s) - power_m(s)) - u_cut
 
     @law
-    def mie_force_over_r(distance_squared: float, strength: float, sigma: float, u_cut: float):
+    def mie_force_over_r(
+        distance_squared: float, strength: float, sigma: float, u_cut: float, f_cut: float,
+        cut: float,
+    ):  # fmt: skip
         inverse = 1.0 / distance_squared
         s = sigma * sigma * inverse
         return strength * (float(n) * power_n(s) - float(m) * power_m(s)) * inverse
@@ -126,12 +132,11 @@ class LennardJones(Pair):
         s = sigma / cut
         u_cut = strength * (s**n - s**m) if truncation != "cut" else 0.0
         f_cut = strength * (n * s**n - m * s**m) / cut if truncation == "force_shift" else 0.0
-        parameters = {"strength": strength, "sigma": sigma, "u_cut": u_cut}
         even = n % 2 == 0 and m % 2 == 0 and truncation != "force_shift"
-        laws = _even_laws(n, m) if even else _laws(n, m)
-        if not even:
-            parameters |= {"f_cut": f_cut, "cut": cut}
-        super().__init__(*laws, group, cut, parameters)
+        super().__init__(
+            *(_even_laws(n, m) if even else _laws(n, m)), group, cut,
+            {"strength": strength, "sigma": sigma, "u_cut": u_cut, "f_cut": f_cut, "cut": cut},
+        )  # fmt: skip
 
     @property
     def acts(self) -> bool:
@@ -147,13 +152,13 @@ class LennardJones(Pair):
         Args:
             density: Particles a volume [1/length^3].
         """
-        (n, m), s, cut = self.exponents, self.sigma, float(self.cutoff or 0.0)
+        (n, m), s, cut = self.exponents, self.sigma, self.parameters["cut"]
         if m <= 3:
             raise validate.fail(self.name, "exponents", "be above 3", (n, m), "it has no tail")
         scale = 2.0 * np.pi * density * self.parameters["strength"]
         a = s**n * cut ** (3 - n) / (n - 3)
         b = s**m * cut ** (3 - m) / (m - 3)
-        u_cut, f_cut = self.parameters["u_cut"], self.parameters.get("f_cut", 0.0)
+        u_cut, f_cut = self.parameters["u_cut"], self.parameters["f_cut"]
         within = 2.0 * np.pi * density * cut**3
         energy = within * (u_cut / 3.0 + f_cut * cut / 12.0)
         virial = within * f_cut * cut / 4.0
