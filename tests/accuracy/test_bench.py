@@ -111,7 +111,12 @@ def test_every_case_says_what_it_is():
     assert all(title_of(path) for path in found.values())
 
 
-@pytest.mark.parametrize("name", SMALL)
+ALIKE = {"cloth_10", "grains_200k", "lennard_jones_256k"}  # others' work, in other numbers
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in ALIKE)) for name in SMALL]
+)
 def test_the_cases_run(name):
     case = load_case(FOLDER / f"{name}.py", SMALL[name])
     assert case.title and case.unit and case.ours

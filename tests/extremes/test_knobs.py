@@ -211,7 +211,7 @@ FAMILIES = {
 }  # fmt: skip
 
 
-FEW = {"lennard_jones", "springs", "sph", "distance", "contact", "box"}  # the others take minutes
+FEW = {"lennard_jones", "contact"}  # the others take minutes
 
 
 CASES = [

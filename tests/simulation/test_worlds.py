@@ -58,6 +58,7 @@ def clouds():
     return [cloud(n, seed, 1 + 0.1 * seed) for seed, n in enumerate((30, 4, 77))]
 
 
+@pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("method", SETTINGS)
 @pytest.mark.parametrize("build", [fluids, clouds])
 def test_a_world_goes_as_it_goes_alone(build, method, precision, device):

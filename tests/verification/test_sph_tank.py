@@ -28,8 +28,8 @@ def test_tank_at_rest():
     scene.add_interaction(ps.Drag(linear=10 * mass, group=water))
     settings = ps.Settings(dt=0.1, substeps=int(np.ceil(0.1 / (0.25 * h / c))))
     sim = ps.Simulation(scene, settings, device="cpu")
-    # The rows of the start rest on each other's tips, until rounding has grown, after some 70 frames,
-    # and they fall into place.
+    # The rows of the start rest on each other's tips until rounding has grown, which takes some 70
+    # frames, and they fall into place.
     sim.run(120)
     y, p = sim.position[water.slice, 1], sim.get("pressure")[water.slice]
     # Water weighs c^2 / (g H) = 100 times less than it resists: a density summed over 25 particles
