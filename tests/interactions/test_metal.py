@@ -178,6 +178,7 @@ def test_the_same_bits_on_graph_and_threads_and_in_a_batch():
     assert (alone[0].position != alone[1].position).any()
 
 
+@pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("periodic", [False, True])
 def test_plain_loops_give_the_same(periodic, precision, monkeypatch):
     results = []

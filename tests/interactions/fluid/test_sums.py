@@ -95,6 +95,7 @@ def test_only_the_group_feels_it_and_pinned_particles_push(cloud, prepared):
     assert np.all(sim.position[wall.slice] == x[wall.slice])
 
 
+@pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
 def test_plain_loop_equals_the_vectorised_one(precision, monkeypatch, cloud, fluid, prepared):
     """The loop in Warp's own language is the reference of the native one."""
     x, v, m = cloud()
@@ -126,6 +127,7 @@ for precision, periodic in (("float32", None), ("float64", ((0, 0, 0), (2, 2, 2)
 """
 
 
+@pytest.mark.slow
 def test_loops_vectorise(tmp_path):
     """Clang warns about a loop that it was told to vectorise and could not."""
     run = subprocess.run(
