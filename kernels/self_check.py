@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from .engine.clusters import SUPER, halving_kernels, supers_type
-from .engine.columns import columns_type
+from .engine.clusters import halving_kernels, supers_type
+from .engine.columns import SUPER, columns_type
 from .engine.loops import ROWS, Pairs, Periodicity, Term, box_type
 from .engine.neighbors import blocks_type
 from .engine.packed import AHEAD, CLUSTER

@@ -10,16 +10,16 @@ import functools
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from ..native import body
 from ..precision import Precision, native, register, structure
 from ..warp_internals import columns
-from .columns import columns_type
+from .columns import SUPER, columns_type
 from .loops import Periodicity, box_type, minimum_image
 from .packed import CLUSTER
 
-SUPER = 16  # slots
 SMALL = 512  # largest world that is halved all the way; measured
 
 
@@ -59,6 +59,7 @@ def halving_kernels(precision: Precision, periodic: Periodicity) -> SimpleNamesp
     real, vec3, Box = precision.scalar, precision.vec3, box_type(precision)
     Supers, Columns = supers_type(precision), columns_type(precision)
     halve, image = _halved(precision, periodic), minimum_image(precision, periodic)
+    rounding = real(8.0 * float(np.finfo(precision.numpy).eps))
 
     @functools.partial(register, cpu_only=True)
     def halve_blocks(
@@ -95,20 +96,21 @@ def halving_kernels(precision: Precision, periodic: Periodicity) -> SimpleNamesp
         if moved[c.world] == 0:
             return
         s = supers.lead[q]
-        n = wp.min(c.end - s, 16)
+        n = wp.min(c.end - s, SUPER)
         b = box[c.world]
         if c.most > 0:
             halve(s, n, b, order_io, planes_io)
         # The box around it, in one piece.
         o = vec3(planes_io[0, s], planes_io[1, s], planes_io[2, s])
-        low = vec3()
-        high = vec3()
+        low, high = vec3(), vec3()
         for i in range(s + 1, s + n):
             d = image(vec3(planes_io[0, i], planes_io[1, i], planes_io[2, i]) - o, b)
             low = wp.min(low, d)
             high = wp.max(high, d)
         for a in range(3):
+            size = high[a] - low[a]
             supers.middle[a, q] = o[a] + real(0.5) * (low[a] + high[a])
-            supers.half[a, q] = real(0.5) * (high[a] - low[a])
+            # Wider by what rounding may have moved the middle and the sides.
+            supers.half[a, q] = real(0.5) * size + rounding * (wp.abs(o[a]) + size)
 
     return SimpleNamespace(blocks=halve_blocks, supers=halve_supers)

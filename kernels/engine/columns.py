@@ -14,6 +14,8 @@ import warp as wp
 from ..precision import Precision, function, register, structure
 from .loops import box_type
 
+SUPER = 16  # slots that are halved together, and that a cell holds
+BINS = 8  # of a column, on the length of its side
 LINE = 256  # bins of the grid along its first axis
 
 
@@ -39,13 +41,14 @@ def columns_type(precision: Precision) -> Any:
 def _sizes(precision: Precision) -> tuple[wp.Function, wp.Function]:
     """``side_of(spread, count, longest)`` of columns, and ``dims_of(length, side, c)``."""
     vec3, real, Columns = precision.vec3, precision.scalar, columns_type(precision)
+    bins, held = real(BINS), real(SUPER)
 
     def side_of(spread: vec3, count: real, longest: real):
         """With it what is spread evenly has one cell for each sixteen."""
         side = wp.where(longest > real(0.0), longest, real(1.0))
         for _n in range(200):
             cells = (spread[0] / side + real(1.0)) * (spread[1] / side + real(1.0))
-            if cells * (spread[2] / side + real(1.0)) * real(16.0) >= count:
+            if cells * (spread[2] / side + real(1.0)) * held >= count:
                 break
             side = side * real(0.9)
         return side
@@ -53,9 +56,10 @@ def _sizes(precision: Precision) -> tuple[wp.Function, wp.Function]:
     def dims_of(length: vec3, side: real, c: Columns):
         """Whole columns fill a periodic axis; an open one is covered."""
         n = wp.vec3i(1, 1, 1)
-        width = vec3(real(0.125), real(1.0), real(1.0)) * side
+        width = vec3(side / bins, side, side)
         for a in range(3):
-            k = int(wp.floor(length[a] / width[a]))
+            # At most what there is room for: how many it is may be beyond whole numbers.
+            k = int(wp.min(wp.floor(length[a] / width[a]), real(c.most)))
             n[a] = wp.where(c.wraps[a] != 0, wp.max(k, 1), k + 1)
         return n
 
@@ -67,6 +71,7 @@ def lay_kernel(precision: Precision) -> wp.Kernel:
     """Kernel: lay the columns of one block over what it fills."""
     vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
     Columns, (side_of, dims_of) = columns_type(precision), _sizes(precision)
+    bins = real(BINS)
 
     @functools.partial(register, cpu_only=True)
     def lay_columns(
@@ -100,16 +105,17 @@ def lay_kernel(precision: Precision) -> wp.Kernel:
             spread[a] = wp.sqrt(real(12.0) * wp.max(square[b] / count - m * m, real(0.0)))
             length[a] = wp.where(c.wraps[a] != 0, box[c.world].length[b], high[b] - low[b])
             lower[a] = wp.where(c.wraps[a] != 0, box[c.world].lower[b], low[b])
-            if not wp.isfinite(length[a] + spread[a]):  # whatever is, it ends somewhere
-                length[a] = real(0.0)
+            if not wp.isfinite(spread[a]):
                 spread[a] = real(0.0)
+            if not wp.isfinite(length[a]):  # wherever they are, it ends somewhere
+                length[a] = real(0.0)
                 lower[a] = real(0.0)
         side = side_of(spread, count, wp.max(length))
         n = dims_of(length, side, c)
         while real(n[0]) * real(n[1]) * real(n[2]) > real(c.most):
             side = side * real(1.1)
             n = dims_of(length, side, c)
-        scale = vec3(real(8.0), real(1.0), real(1.0)) / side
+        scale = vec3(bins, real(1.0), real(1.0)) / side
         for a in range(3):
             if c.wraps[a] != 0:
                 scale[a] = real(n[a]) / length[a]
@@ -160,7 +166,7 @@ def number_kernel(precision: Precision) -> wp.Kernel:
             b = c.dims[0] - 1 - b
         number = column * c.dims[0] + b
         bin_out[i] = number
-        place_out[i] = wp.vec3f(float(number % 256) + 0.5, float(number / 256) + 0.5, 0.5)
+        place_out[i] = wp.vec3f(float(number % LINE) + 0.5, float(number / LINE) + 0.5, 0.5)
 
     return number_bins
 

@@ -22,9 +22,11 @@ alignas(64) int id[TILE + W];
 real push[SIZE] = {};
 ROOM
 
-auto image = [&](real d, int n) __attribute__((always_inline)) -> real {
-    return d - box.length[n] * __builtin_elementwise_rint(d * box.inverse[n]);
+// A place, or displacement, moved by as many boxes as bring displacement d to the nearest image.
+auto moved = [&](real place, real d, int n) __attribute__((always_inline)) -> real {
+    return place - box.length[n] * __builtin_elementwise_rint(d * box.inverse[n]);
 };
+auto image = [&](real d, int n) __attribute__((always_inline)) -> real { return moved(d, d, n); };
 
 // Own slots in the image next to the first one. Images go by that one where all that any of them
 // can see is within half a box of it; and where that is within the box, there are none.
@@ -41,7 +43,7 @@ for (int n = 0; n < 3; ++n) {
     const real reach = __builtin_elementwise_sqrt(p.cutoff_squared);
     real most = 0;
     for (int u = 0; u < SIZE; ++u) {
-        b[n][u] = first + image(b[n][u] - first, n);
+        b[n][u] = moved(b[n][u], b[n][u] - first, n);
         most = __builtin_elementwise_max(most, __builtin_elementwise_abs(b[n][u] - first));
     }
     near = near & (reach + most < half);
@@ -83,10 +85,8 @@ for (int tile = 0; tile < partners; tile += TILE) {
     if (near & !inner)
         for (int n = 0; n < 3; ++n)
             if (PERIODIC[n])
-                for (int k = OFF; k < OFF + top; ++k) {
-                    const real d = b[n][k] - b[n][0];
-                    b[n][k] -= box.length[n] * __builtin_elementwise_rint(d * box.inverse[n]);
-                }
+                for (int k = OFF; k < OFF + top; ++k)
+                    b[n][k] = moved(b[n][k], b[n][k] - b[n][0], n);
     // Behind the last: so far that the square is infinite, and 0 times it is 0. Images of that would
     // be no numbers; where there are any, lanes are counted.
     for (int k = OFF + m; k < OFF + top; ++k)

@@ -18,6 +18,7 @@ import warp as wp
 from ..native import body
 from ..precision import Precision, native
 from ..warp_internals import array_fields, elements, native_name, numbers_in, pointed, vector
+from .lanes import lane_count
 from .loops import ROWS, Pairs, Periodicity, Term, box_type
 
 CLUSTER = 4  # slots of a cluster of a list
@@ -30,7 +31,6 @@ AHEAD = 16  # entries beyond the end of all rows that are read
 # from laws that are given, perhaps in an order that keeps them in range.
 FUSED = "-ffp-contract=fast -fno-signed-zeros"
 FLAGS = {None: "", "fused": FUSED, "any": f"{FUSED} -freciprocal-math -mreassociate"}
-LANES = {"float": 16, "double": 8}
 FAR = {"float": "1e30f", "double": "1e200"}
 
 
@@ -72,7 +72,7 @@ def _fields(data: Any, precision: Precision, path: str = "") -> Iterator[tuple[s
 def _numbers(
     term: Term, precision: Precision, periodic: Periodicity, listed: bool
 ) -> dict[str, Any]:
-    lanes = LANES[precision.c]
+    lanes = lane_count(precision)
     return {
         "W": lanes, "OFF": CROWD, "TILE": TILE, "SIZE": CLUSTER if listed else CROWD,
         "WIDTH": term.width, "CENTRAL": term.direction is not None, "LISTED": listed,
@@ -93,7 +93,7 @@ def _arrays() -> dict[str, str]:
 def _macros(
     term: Term, store: wp.Function, fields: list[tuple[str, str, int]], precision: Precision
 ) -> dict[str, str]:
-    lanes = LANES[precision.c]
+    lanes = lane_count(precision)
     room, copy = ["auto local = d;"], []
     for k, (path, kind, width) in enumerate(fields):
         room.append(f"alignas(64) {kind} copy{k}[{width} * (OFF + TILE) + 1];")

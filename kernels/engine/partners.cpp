@@ -12,10 +12,13 @@ const int c0 = cluster_of[q], clusters = (size + CLUSTER - 1) / CLUSTER;
 const int room = rooms[b];
 const real at[3] = {middle[q], middle[supers_n + q], middle[2 * supers_n + q]};
 const real reach[3] = {half[q], half[supers_n + q], half[2 * supers_n + q]};
-auto image = [&](real d, int n) __attribute__((always_inline)) -> real {
-    if (!PERIODIC[n]) return d;
-    return d - box.length[n] * __builtin_elementwise_rint(d * box.inverse[n]);
+// A place or displacement, moved by as many boxes as bring displacement d to the nearest image; where
+// there are none it stays as it is, to the last bit.
+auto moved = [&](real place, real d, int n) __attribute__((always_inline)) -> real {
+    if (!PERIODIC[n]) return place;
+    return place - box.length[n] * __builtin_elementwise_rint(d * box.inverse[n]);
 };
+auto image = [&](real d, int n) __attribute__((always_inline)) -> real { return moved(d, d, n); };
 
 // Own slots in the image next to the middle; a cluster that lacks slots has its first once more.
 // Each sixteen times, for sixteen lanes, which the compiler would otherwise do for every super.
@@ -23,7 +26,7 @@ alignas(64) real own[3][SUPER][SUPER];
 for (int k = 0; k < SUPER; ++k) {
     const int first = k / CLUSTER * CLUSTER, s = lead + (k < size ? k : first < size ? first : 0);
     for (int n = 0; n < 3; ++n) {
-        const real place = at[n] + image(px[n * stride + s] - at[n], n);
+        const real raw = px[n * stride + s], place = moved(raw, raw - at[n], n);
         for (int l = 0; l < SUPER; ++l) own[n][k][l] = place;
     }
 }
@@ -154,9 +157,9 @@ for (int other = world_first[w]; other < world_first[w + 1]; ++other) {
                 for (int l = 0; l < SUPER; ++l) {
                     real xj = px[s + l], yj = py[s + l], zj = pz[s + l];
                     if (!wide) {
-                        xj = at[0] + image(xj - at[0], 0);
-                        yj = at[1] + image(yj - at[1], 1);
-                        zj = at[2] + image(zj - at[2], 2);
+                        xj = moved(xj, xj - at[0], 0);
+                        yj = moved(yj, yj - at[1], 1);
+                        zj = moved(zj, zj - at[2], 2);
                     }
 #pragma clang loop unroll(full)
                     for (int t = 0; t < CLUSTERS; ++t) {

@@ -7,8 +7,8 @@ import warp as wp
 from ..native import body
 from ..precision import Precision, native, register
 from ..warp_internals import columns
-from .clusters import SUPER, supers_type
-from .columns import columns_type
+from .clusters import supers_type
+from .columns import SUPER, columns_type
 from .loops import Pairs, Periodicity, box_type
 from .neighbors import blocks_type
 from .packed import CLUSTER

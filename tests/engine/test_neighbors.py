@@ -130,6 +130,19 @@ def test_worlds_that_overlap_are_kept_apart(counts, precision, device):
     check(scenes, ps.Settings(precision=precision), device, cutoff=1.5)
 
 
+@pytest.mark.parametrize("far", [1e7, 1e9, 1e15])
+def test_one_far_away_hides_nobody(far):
+    """In float32, of which the distance to it has no digit left for the others."""
+    x = np.concatenate([[(far, -2 * far, 3 * far)], scatter("random")])
+    scene = ps.Scene()
+    scene.add_particles(x)
+    scene.add_interaction(ps.LennardJones(cutoff=1.3, epsilon=0.0))
+    (rows,) = ps.Simulation(scene, ps.Settings(precision="float32"), device="cpu").neighbors.lists
+    r = true_pairs(x[1:], np.zeros(len(x) - 1), 1.3, np.zeros(3))
+    for k, own in enumerate(r):
+        assert set(np.nonzero(own < 1.3)[0] + 1) <= set(rows.neighbors_of(k + 1).tolist())
+
+
 def test_a_group_sees_only_itself(device):
     scene = ps.Scene()
     x = scatter("random", 1400)

@@ -9,7 +9,7 @@ import warp as wp
 
 from particlesim.kernels import warp_internals as internals
 from particlesim.kernels import warp_native as inside
-from particlesim.kernels.precision import kernel, native
+from particlesim.kernels.precision import function, kernel, native
 
 # Packed launches --------------------------------------------------------------------------------
 
@@ -110,6 +110,61 @@ def test_arrays_in_native_code(precision):
     out = wp.zeros(2, dtype=vec3, device="cpu")
     wp.launch(pick_rows, 2, [v, table, out], device="cpu")
     assert out.numpy().tolist() == [[2.0, 5.0, 5.0], [5.0, 5.0, 5.0]]
+
+
+@wp.struct
+class Fields:
+    """Arrays of one dimension and of two, a number and a struct of arrays."""
+
+    x: wp.array(dtype=wp.vec3d)
+    table: wp.array2d(dtype=wp.float64)
+    count: wp.int32
+
+
+@wp.struct
+class Outer:
+    """A struct that holds another one."""
+
+    part: Fields
+    mark: wp.array(dtype=wp.int32)
+
+
+def test_arrays_of_structs_are_known():
+    assert internals.array_fields(Fields) == [("x", wp.vec3d)]
+    (name, kind), mark = internals.array_fields(Outer)
+    assert name == "part" and internals.array_fields(kind) == [("x", wp.vec3d)]
+    assert mark == ("mark", wp.int32)
+    vec5 = wp.types.vector(5, wp.float64)
+    kinds = (wp.float64, wp.vec3d, vec5, wp.float32, wp.vec3f, wp.int32)
+    assert [internals.numbers_in(kind, wp.float64) for kind in kinds] == [1, 3, 5, 0, 0, 0]
+
+
+def test_an_array_may_point_to_what_native_code_has_made():
+    def second(i: int, a: wp.array(dtype=wp.vec3d)) -> wp.vec3d:
+        return a[i]
+
+    read = function(second)
+
+    def copied(given: wp.array(dtype=wp.vec3d)) -> wp.vec3d:
+        read(0, given)
+
+    snippet = f"""
+    double copy[6];
+    for (int k = 0; k < 6; ++k) copy[k] = 10.0 * {internals.elements("given", "double")}[k];
+    auto local = given;
+    {internals.pointed("local", "copy", "3 * sizeof(double)")}
+    return {internals.native_name(read)}(1, local);
+"""
+    act = native(copied, snippet)
+
+    @kernel
+    def look(given: wp.array(dtype=wp.vec3d), out: wp.array(dtype=wp.vec3d)):
+        out[0] = act(given)
+
+    given = wp.array(np.arange(6.0).reshape(2, 3), dtype=wp.vec3d, device="cpu")
+    out = wp.zeros(1, dtype=wp.vec3d, device="cpu")
+    wp.launch(look, 1, [given, out], device="cpu")
+    assert out.numpy().tolist() == [[30.0, 40.0, 50.0]]
 
 
 # Matrices and structs ---------------------------------------------------------------------------

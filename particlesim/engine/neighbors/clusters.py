@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ...kernels.engine.clusters import SUPER, halving_kernels, supers_type
+from ...kernels.engine.clusters import halving_kernels, supers_type
 from ...kernels.engine.columns import (
     LINE,
+    SUPER,
     columns_type,
     lay_kernel,
     number_kernel,

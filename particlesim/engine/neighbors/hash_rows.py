@@ -32,7 +32,7 @@ class HashRows:
         self.listed, self.model = listed, listed.model
         model, count = self.model, listed.count
         real, vec3, device = model.precision.scalar, model.precision.vec3, model.device
-        self.large, self.room = large, np.zeros(len(listed.blocks), dtype=int)
+        self.room = np.zeros(len(listed.blocks), dtype=int)
         used = np.array([large[block.world] for block in listed.blocks], dtype=bool)
         sizes = np.array([block.count for block in listed.blocks])
         small = (listed.cutoff > 0) & ~large
