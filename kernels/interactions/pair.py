@@ -177,42 +177,33 @@ def pair_kernel(
     """
     key = (term, store, precision.name, tuple(periodic), partners, vectorised)
     if key not in _KERNELS:
-        own = (data, params, out, precision, periodic, partners)
-        _KERNELS[key] = (
-            _packed_kernel(term, store, *own) if vectorised else _pair_kernel(term, store, *own)
-        )
+        types = (data, params, out)
+        make = packed_loop if vectorised else _plain_sums
+        sums = make(term, store, *types, precision, periodic, partners)
+        flags = FLAGS[term.rounding] if vectorised else ""
+        mark = functools.partial(register, cpu_only=vectorised, flags=flags)
+        _KERNELS[key] = _pair_kernel(sums, *types, precision, mark)
     return _KERNELS[key]
 
 
 _KERNELS: dict[tuple, wp.Kernel] = {}
 
 
-def _pair_kernel(term, store, data, params, out, precision, periodic, partners) -> wp.Kernel:
+def _plain_sums(term, store, data, params, out, precision, periodic, partners) -> wp.Function:
+    """What ``packed_loop`` makes, of slots that are clusters of their own."""
     Box = box_type(precision)
     loop = plain_loop(term, data, params, precision, periodic, partners)
 
-    @register
-    def sum_over_partners(
-        first: int,
-        pairs: Pairs,
-        box: wp.array(dtype=Box),
-        parameters: wp.array(dtype=params),
-        d: data,
-        o: out,
-    ):
-        i = first + wp.tid()
-        w = pairs.world[i]
-        p = parameters[w]
-        store(i, pairs.order[i], loop(i, pairs, box[w], d, p), d, p, o)
+    def plain(c: int, pairs: Pairs, box: Box, d: data, p: params, o: out):
+        store(c, pairs.order[c], loop(c, pairs, box, d, p), d, p, o)
 
-    return sum_over_partners
+    return function(plain, after_gradients=True)
 
 
-def _packed_kernel(term, store, data, params, out, precision, periodic, partners) -> wp.Kernel:
+def _pair_kernel(sums, data, params, out, precision, mark) -> wp.Kernel:
     Box = box_type(precision)
-    loop = packed_loop(term, store, data, params, out, precision, periodic, partners)
 
-    @functools.partial(register, cpu_only=True, flags=FLAGS[term.rounding])
+    @mark
     def sum_over_partners(
         first: int,
         pairs: Pairs,
@@ -223,7 +214,7 @@ def _packed_kernel(term, store, data, params, out, precision, periodic, partners
     ):
         c = first + wp.tid()
         w = pairs.world[pairs.lead[c]]
-        loop(c, pairs, box[w], d, parameters[w], o)
+        sums(c, pairs, box[w], d, parameters[w], o)
 
     return sum_over_partners
 

@@ -144,11 +144,13 @@ def forces(part: Any, probe: Probe, w: int, couples: np.ndarray, r: np.ndarray) 
     pairs = Pairs()
     pairs.order = model.array(slots, wp.int32)
     pairs.world = model.array(np.full(2 * count, w), wp.int32)
-    pairs.lead = model.array(np.arange(0, 2 * count + 1, 2), wp.int32)
-    pairs.cluster = model.array(slots // 2, wp.int32)
-    pairs.count = model.array(np.full(count, 2), wp.int32)
+    size = 2 if model.vectorised else 1
+    first = slots[::size]
+    pairs.lead = model.array(np.append(first, 2 * count), wp.int32)
+    pairs.cluster = model.array(slots // size, wp.int32)
+    pairs.count = model.array(np.full(len(first), 2), wp.int32)
     pairs.index = model.array(np.append(slots, np.zeros(AHEAD)), wp.int32)
-    pairs.row, pairs.entry_stride = model.array(2 * slots[:count], wp.int64), 1
+    pairs.row, pairs.entry_stride = model.array(first // 2 * 2, wp.int64), 1
     room = np.zeros((2 * count + 1, 3), dtype=precision.numpy)
     room[:-1] = x
     fields = {"x": model.array(room, precision.vec3)[:-1], "slot": model.array(slots, wp.int32)}
@@ -156,10 +158,9 @@ def forces(part: Any, probe: Probe, w: int, couples: np.ndarray, r: np.ndarray) 
         source = probe.state[name]
         fields[name] = model.array(source.numpy()[particle], source.dtype)
     f = wp.zeros(2 * count, dtype=precision.vec3, device=model.device)
-    rows = count if model.vectorised else 2 * count
     listed = SimpleNamespace(
         pairs=pairs, partners=part.pairs.partners,
-        sum=lambda kernel, inputs: launch(kernel, rows, inputs, model.device),
+        sum=lambda kernel, inputs: launch(kernel, len(first), inputs, model.device),
     )  # fmt: skip
     loop = replace(part.loop, pairs=listed, data=filled(part.loop.Data, fields))
     loop.sum(part.term, add_force, {"f": f})
