@@ -135,7 +135,7 @@ def _found() -> Pairs:
     blocks.reach_squared = wp.array([[1.0]], dtype=real)
     supers.lead, supers.block, supers.first = _whole([0]), _whole([0]), _whole([0, 1])
     supers.cluster = _whole([0])
-    supers.middle, supers.half = (wp.zeros((3, 1), dtype=real) for _ in range(2))
+    supers.middle, supers.half = (wp.zeros((3, SUPER), dtype=real) for _ in range(2))
     planes = wp.zeros((3, N + 2 * SUPER), dtype=real)
     laid, box = wp.array(columns, dtype=columns_type(FLOAT64)), wp.zeros(1, box_type(FLOAT64))
     x, moved = wp.array(X, dtype=VEC3), _whole([1])

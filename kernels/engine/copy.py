@@ -5,86 +5,68 @@ from typing import Any
 
 import warp as wp
 
-from ..precision import Precision, function, register
+from ..precision import native, register
+from ..warp_internals import elements
+
+BLOCK = 256  # rows that a thread of the CPU takes at once
 
 
 @functools.cache
-def copy_kernel(dtype: Any) -> wp.Kernel:
-    """Kernel: target = source, row by row."""
+def copy_kernel(dtype: Any, block: int = 1) -> wp.Kernel:
+    """Kernel: target = source, row by row, or ``block`` rows by a thread."""
+    if block == 1:
 
-    @register
-    def copy_rows(first: int, source: wp.array(dtype=dtype), target_out: wp.array(dtype=dtype)):
-        i = first + wp.tid()
-        target_out[i] = source[i]
+        @register
+        def copy_rows(first: int, source: wp.array(dtype=dtype), target_out: wp.array(dtype=dtype)):
+            i = first + wp.tid()
+            target_out[i] = source[i]
 
-    return copy_rows
+        return copy_rows
 
+    def copy_natively(
+        first: int, last: int, source: wp.array(dtype=dtype), target: wp.array(dtype=dtype)
+    ): ...
 
-@functools.cache
-def zero_kernel(dtype: Any) -> wp.Kernel:
-    """Kernel: target = 0, row by row."""
+    there, here = _bytes("target", dtype), _bytes("source", dtype)
+    copy = native(copy_natively, f"__builtin_memcpy({there}, {here}, {_size(dtype)});", False)
 
-    @register
-    def zero_rows(first: int, target_out: wp.array(dtype=dtype)):
-        target_out[first + wp.tid()] = dtype()
+    @functools.partial(register, cpu_only=True)
+    def copy_blocks(first: int, source: wp.array(dtype=dtype), target_out: wp.array(dtype=dtype)):
+        i = (first + wp.tid()) * wp.static(block)
+        copy(i, wp.min(i + wp.static(block), source.shape[0]), source, target_out)
 
-    return zero_rows
-
-
-QUANTITIES = 10  # mass, momentum (3), angular momentum (3), kinetic, potential, virial
-
-
-def widened(precision: Precision) -> wp.Function:
-    """``wide(v)``: a vector in float64."""
-    vec3 = precision.vec3
-
-    def wide(v: vec3):
-        return wp.vec3d(wp.float64(v[0]), wp.float64(v[1]), wp.float64(v[2]))
-
-    return function(wide)
+    return copy_blocks
 
 
 @functools.cache
-def block_sums_kernel(precision: Precision) -> wp.Kernel:
-    """Kernel: one thread sums one block of particles, one after the other, in float64."""
-    vec3, real, wide = precision.vec3, precision.scalar, widened(precision)
+def zero_kernel(dtype: Any, block: int = 1) -> wp.Kernel:
+    """Kernel: target = 0, row by row, or ``block`` rows by a thread."""
+    if block == 1:
 
-    @register
-    def block_sums(
-        first: int,
-        begin: wp.array(dtype=wp.int32),
-        end: wp.array(dtype=wp.int32),
-        x: wp.array(dtype=vec3),
-        v: wp.array(dtype=vec3),
-        m: wp.array(dtype=real),
-        w: wp.array(dtype=real),
-        energy: wp.array(dtype=wp.float64),
-        virial: wp.array(dtype=wp.float64),
-        sums_out: wp.array2d(dtype=wp.float64),
-    ):
-        b = first + wp.tid()
-        mass = wp.float64(0.0)
-        p = wp.vec3d()
-        angular = wp.vec3d()
-        kinetic = wp.float64(0.0)
-        potential = wp.float64(0.0)
-        total_virial = wp.float64(0.0)
-        for i in range(begin[b], end[b]):
-            m_i = wp.float64(m[i])
-            mass += m_i
-            if w[i] > real(0.0):  # a pinned particle's momentum is not the scene's
-                v_i = wide(v[i])
-                p += m_i * v_i
-                angular += m_i * wp.cross(wide(x[i]), v_i)
-                kinetic += wp.float64(0.5) * m_i * wp.dot(v_i, v_i)
-            potential += energy[i]
-            total_virial += virial[i]
-        sums_out[b, 0] = mass
-        for a in range(3):
-            sums_out[b, 1 + a] = p[a]
-            sums_out[b, 4 + a] = angular[a]
-        sums_out[b, 7] = kinetic
-        sums_out[b, 8] = potential
-        sums_out[b, 9] = total_virial
+        @register
+        def zero_rows(first: int, target_out: wp.array(dtype=dtype)):
+            target_out[first + wp.tid()] = dtype()
 
-    return block_sums
+        return zero_rows
+
+    def zero_natively(first: int, last: int, target: wp.array(dtype=dtype)): ...
+
+    zero = native(
+        zero_natively, f"__builtin_memset({_bytes('target', dtype)}, 0, {_size(dtype)});", False
+    )
+
+    @functools.partial(register, cpu_only=True)
+    def zero_blocks(first: int, target_out: wp.array(dtype=dtype)):
+        i = (first + wp.tid()) * wp.static(block)
+        zero(i, wp.min(i + wp.static(block), target_out.shape[0]), target_out)
+
+    return zero_blocks
+
+
+def _bytes(array: str, dtype: Any) -> str:
+    """C++: where row ``first`` begins."""
+    return f"{elements(array, 'char')} + {wp.types.type_size_in_bytes(dtype)} * (long long)first"
+
+
+def _size(dtype: Any) -> str:
+    return f"{wp.types.type_size_in_bytes(dtype)} * (long long)(last - first)"

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import warp as wp
 
 from ..precision import Precision, function, register
-from .copy import widened
 from .integrate import motion_type
+from .sums import widened
 
 
 def _narrowed(precision: Precision) -> wp.Function:

@@ -14,12 +14,13 @@ def lane_count(precision: Precision) -> int:
     return 16 if precision.c == "float" else 8
 
 
-def row_moves(precision: Precision) -> str:
+def row_moves(precision: Precision, *, spare: bool = False) -> str:
     """C++ functions that move rows of three numbers, one row for each lane.
 
     ``fetch(x, id, stride, plane, size)``: row ``id[l * stride]`` of ``x`` comes to entry l of three
     planes, each ``size`` numbers behind the one before it. ``put`` has the same arguments and is
-    the way back. What lies beside the rows is neither read nor written.
+    the way back. What lies beside the rows is not written, and read only where there is something
+    to ``spare``: a number behind the last row. Loads are then part of what takes their values.
     """
     real, lanes = precision.c, lane_count(precision)
     groups = range(0, lanes, 4)
@@ -43,7 +44,11 @@ def row_moves(precision: Precision) -> str:
     typedef bool Three __attribute__((ext_vector_type(4)));
     const Three three = {{1, 1, 1, 0}};
     auto load = [=](const {real}* x, int i) -> Quad {{
-        return __builtin_masked_load(three, x + 3 * (long long)i);
+        {
+        "Quad v; __builtin_memcpy(&v, x + 3 * (long long)i, sizeof(v)); return v"
+        if spare
+        else "return __builtin_masked_load(three, x + 3 * (long long)i)"
+    };
     }};
     auto store = [=]({real}* x, int i, Quad v) {{
         __builtin_masked_store(three, v, x + 3 * (long long)i);

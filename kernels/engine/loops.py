@@ -48,7 +48,8 @@ class Term:
     w x_ij + push direction, the second for coincident pairs, whose x_ij is zero.
 
     Args:
-        function: ``(i, j, x_ij, r2, d, p)``, which gives a vector.
+        function: ``(i, j, x_ij, r2, d, p)``, which gives a vector. It is also evaluated where
+            nothing comes of it, as beyond the cutoff and at an infinite r2: it stays within arrays.
         width: Numbers of the sum.
         direction: Of unit length.
         rounding: As the compiler may have it: a product and a sum in one; or ``"any"``, with

@@ -13,7 +13,8 @@ from typing import Any
 
 import warp as wp
 
-from ..precision import Precision, register, structure
+from ..precision import Precision, native, register, structure
+from ..warp_internals import elements
 from .loops import Periodicity, box_type, minimum_image
 
 
@@ -42,13 +43,20 @@ def blocks_type(precision: Precision) -> Any:
     )
 
 
+BLOCK = 64  # slots that a thread of the CPU looks at
+
+
 @functools.cache
-def moved_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
-    """Flag each world in which a slot has moved further than its margin (half the skin)."""
+def moved_kernel(precision: Precision, periodic: Periodicity, block: int = 1) -> wp.Kernel:
+    """Flag each world in which a slot has moved further than its margin (half the skin).
+
+    A thread looks at ``block`` slots.
+    """
     vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
     image = minimum_image(precision, periodic)
+    stayed = _stayed(precision, periodic)
 
-    @register
+    @functools.partial(register, cpu_only=block > 1)
     def flag_moved(
         first: int,
         members: wp.array(dtype=wp.int32),
@@ -60,17 +68,62 @@ def moved_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
         moved: wp.array(dtype=wp.int32),
         any_moved: wp.array(dtype=wp.int32),
     ):
-        k = first + wp.tid()
-        w = world[k]
-        d = image(x[members[k]] - x_listed[k], box[w])
-        if wp.dot(d, d) > margin_squared[w]:
-            # Every writer writes the same, and once: threads would fight over the cache line.
-            if moved[w] == 0:
-                moved[w] = 1
-            if any_moved[0] == 0:
-                any_moved[0] = 1
+        begin = (first + wp.tid()) * wp.static(block)
+        end = wp.min(begin + wp.static(block), members.shape[0])
+        if wp.static(block > 1):
+            if stayed(begin, end, members, world, box, margin_squared, x, x_listed) != 0:
+                end = begin
+        for k in range(begin, end):
+            w = world[k]
+            d = image(x[members[k]] - x_listed[k], box[w])
+            if wp.dot(d, d) > margin_squared[w]:
+                # Every writer writes the same, and once: threads would fight over the cache line.
+                if moved[w] == 0:
+                    moved[w] = 1
+                if any_moved[0] == 0:
+                    any_moved[0] = 1
 
     return flag_moved
+
+
+def _stayed(precision: Precision, periodic: Periodicity) -> wp.Function:
+    """``stayed(begin, end, ...)``: 1 if it is quickly seen that none of these slots has moved far.
+
+    It is where they are of one world, and particles that follow each other.
+    """
+    vec3, Box, c = precision.vec3, box_type(precision), precision.c
+    nearest = " ".join(
+        f"d[{a}] -= b.length[{a}] * __builtin_elementwise_rint(d[{a}] * b.inverse[{a}]);"
+        for a, on in enumerate(periodic)
+        if on
+    )
+    snippet = f"""
+    const int *all = {elements("members", "int")} + begin, i = all[0];
+    const int w = {elements("world", "int")}[begin];
+    int apart = {elements("world", "int")}[end - 1] - w;
+    for (int k = 0; k < end - begin; ++k) apart |= all[k] - i - k;
+    if (apart) return 0;
+    const auto b = box.data[w];
+    const {c} margin = {elements("margin_squared", c)}[w];
+    const {c}* now = {elements("x", c)} + 3 * (long long)i;
+    const {c}* then = {elements("x_listed", c)} + 3 * (long long)begin;
+    int far = 0;
+    for (int k = 0; k < end - begin; ++k) {{
+        {c} d[3];
+        for (int a = 0; a < 3; ++a) d[a] = now[3 * k + a] - then[3 * k + a];
+        {nearest}
+        far |= d[0] * d[0] + d[1] * d[1] + d[2] * d[2] > margin;
+    }}
+    return !far;
+"""
+
+    def stayed(
+        begin: int, end: int, members: wp.array(dtype=wp.int32), world: wp.array(dtype=wp.int32),
+        box: wp.array(dtype=Box), margin_squared: wp.array(dtype=precision.scalar),
+        x: wp.array(dtype=vec3), x_listed: wp.array(dtype=vec3),
+    ) -> int: ...  # fmt: skip
+
+    return native(stayed, snippet, after_gradients=False)
 
 
 @functools.cache

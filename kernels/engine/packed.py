@@ -18,7 +18,7 @@ import warp as wp
 from ..native import body
 from ..precision import Precision, native
 from ..warp_internals import array_fields, elements, native_name, numbers_in, pointed, vector
-from .lanes import lane_count
+from .lanes import lane_count, row_moves
 from .loops import ROWS, Pairs, Periodicity, Term, box_type
 
 CLUSTER = 4  # slots of a cluster of a list
@@ -40,15 +40,16 @@ def packed_loop(
 ) -> wp.Function:  # fmt: skip
     """``loop(c, pairs, box, d, p, o)``: sum over the partners of cluster c, and store the sums.
 
-    Rows must be contiguous (entry stride 1) and hold the cluster's own slots first. Outside the
-    cutoff the term is evaluated at a harmless distance and multiplied away by a select, so that the
-    loop has no branch.
+    Rows must be contiguous (entry stride 1) and hold the cluster's own slots first. The term is
+    evaluated for all, and taken by a select where it counts, so that the loop has no branch.
     """
     Box, give, vec3 = box_type(precision), term.function, precision.vec3
     total, unit = precision.vector(term.width), precision.scalar(1.0)
     numbers, arrays = _numbers(term, precision, periodic, partners == ROWS), _arrays()
     macros = _macros(term, store, list(_fields(data, precision)), precision)
-    snippet = body("engine/packed.cpp", precision, numbers, arrays, macros)
+    snippet = row_moves(precision, spare=True) + body(
+        "engine/packed.cpp", precision, numbers, arrays, macros
+    )
 
     def packed(c: int, pairs: Pairs, box: Box, d: data, p: params, o: out):
         give(0, 0, vec3(), unit, d, p)

@@ -4,6 +4,8 @@
 
 typedef unsigned char Bytes __attribute__((vector_size(8)));
 typedef int Ints __attribute__((vector_size(32)));
+typedef bool Bits __attribute__((ext_vector_type(SUPER)));
+typedef unsigned char Hits __attribute__((ext_vector_type(SUPER)));
 
 const real *py = px + stride, *pz = py + stride;
 const int b = block_of[q], lead = leads[q];
@@ -32,7 +34,7 @@ for (int k = 0; k < SUPER; ++k) {
 }
 
 int* out[CLUSTERS];
-int n[CLUSTERS] = {}, space[CLUSTERS], lost[LEAST];
+int n[CLUSTERS] = {}, space[CLUSTERS], lost[LEAST + SUPER];
 const long long attic_begin = attic_first[w], attic_end = attic_first[w + 1];
 for (int t = 0; t < clusters; ++t) {
     row[c0 + t] = block_row[b] + (long long)room * (c0 + t - block_cluster[b]);
@@ -48,7 +50,22 @@ auto move = [&](int t) {
     out[t] = index + to, space[t] = more, row[c0 + t] = to;
 };
 
-unsigned char hit[CLUSTERS][SUPER];
+// The slots of a mask of eight. All eight are written, those behind to be overwritten.
+auto put = [](int* to, int s, unsigned mask) __attribute__((always_inline)) {
+    Bytes chosen;
+    __builtin_memcpy(&chosen, LANES + mask, sizeof(chosen));
+    const Ints slots = __builtin_convertvector(chosen, Ints) + s;
+    __builtin_memcpy(to, &slots, sizeof(slots));
+};
+// Bit l: whether entry l of sixteen is not 0.
+auto bits_of = [](const unsigned char* hit) __attribute__((always_inline)) -> unsigned {
+    Hits all;
+    __builtin_memcpy(&all, hit, sizeof(all));
+    return __builtin_bit_cast(unsigned short, __builtin_convertvector(all, Bits));
+};
+auto first_of = [](int many) -> unsigned { return many < SUPER ? (1u << many) - 1 : 0xffffu; };
+
+alignas(64) unsigned char hit[CLUSTERS][SUPER], close[SUPER];
 int run_a[RUNS], run_b[RUNS];
 for (int other = world_first[w]; other < world_first[w + 1]; ++other) {
     const real R2 = reach_squared[b * blocks_n + other - world_first[w]];
@@ -139,64 +156,70 @@ for (int other = world_first[w]; other < world_first[w + 1]; ++other) {
     bool near = true;
     for (int a = 0; a < 3; ++a)
         if (PERIODIC[a]) near = near & (R + reach[a] < (real)0.4999 * box.length[a]);
+    // Between boxes of these halves, whose middles are d apart.
+    auto gap = [&](real d, real other, int n) __attribute__((always_inline)) -> real {
+        const real free = __builtin_elementwise_abs(image(d, n)) - other - reach[n];
+        return free > 0 ? free : 0;
+    };
+    const real *mx = middle, *my = mx + supers_n, *mz = my + supers_n;
+    const real *hx = half, *hy = hx + supers_n, *hz = hy + supers_n;
     for (int k = 0; k < runs; ++k)
-        for (int sp = run_a[k]; sp < run_b[k]; ++sp) {
-            real gap = 0;
-            for (int a = 0; a < 3; ++a) {
-                const real d = __builtin_elementwise_abs(image(middle[a * supers_n + sp] - at[a], a));
-                const real free = d - half[a * supers_n + sp] - reach[a];
-                gap += free > 0 ? free * free : 0;
+        for (int sixteen = run_a[k]; sixteen < run_b[k]; sixteen += SUPER) {
+            // Sixteen supers at a time: those whose boxes are within R.
+            for (int l = 0; l < SUPER; ++l) {
+                const int sp = sixteen + l;
+                const real dx = gap(mx[sp] - at[0], hx[sp], 0), dy = gap(my[sp] - at[1], hy[sp], 1);
+                const real dz = gap(mz[sp] - at[2], hz[sp], 2);
+                close[l] = dx * dx + dy * dy + dz * dz <= R * R;
             }
-            if (gap > R * R) continue;
-            const int s = leads[sp];
-            // Which of its sixteen slots are within R of some slot of each cluster.
-            auto look = [&](auto kind) __attribute__((always_inline)) {
+            unsigned those = bits_of(close) & first_of(run_b[k] - sixteen);
+            for (; those; those &= those - 1) {
+                const int sp = sixteen + __builtin_ctz(those);
+                const int s = leads[sp];
+                // Which of its sixteen slots are within R of some slot of each cluster.
+                auto look = [&](auto kind) __attribute__((always_inline)) {
 #pragma clang fp contract(fast)
-                constexpr bool wide = decltype(kind)::wide;
+                    constexpr bool wide = decltype(kind)::wide;
 #pragma clang loop vectorize(enable)
-                for (int l = 0; l < SUPER; ++l) {
-                    real xj = px[s + l], yj = py[s + l], zj = pz[s + l];
-                    if (!wide) {
-                        xj = moved(xj, xj - at[0], 0);
-                        yj = moved(yj, yj - at[1], 1);
-                        zj = moved(zj, zj - at[2], 2);
-                    }
-#pragma clang loop unroll(full)
-                    for (int t = 0; t < CLUSTERS; ++t) {
-                        real best = 0;
-#pragma clang loop unroll(full)
-                        for (int u = 0; u < CLUSTER; ++u) {
-                            const int k = CLUSTER * t + u;
-                            real dx = xj - own[0][k][l], dy = yj - own[1][k][l];
-                            real dz = zj - own[2][k][l];
-                            if (wide) dx = image(dx, 0), dy = image(dy, 1), dz = image(dz, 2);
-                            const real r2 = dx * dx + dy * dy + dz * dz;
-                            best = u == 0 || r2 < best ? r2 : best;
+                    for (int l = 0; l < SUPER; ++l) {
+                        real xj = px[s + l], yj = py[s + l], zj = pz[s + l];
+                        if (!wide) {
+                            xj = moved(xj, xj - at[0], 0);
+                            yj = moved(yj, yj - at[1], 1);
+                            zj = moved(zj, zj - at[2], 2);
                         }
-                        hit[t][l] = best < R2;
+#pragma clang loop unroll(full)
+                        for (int t = 0; t < CLUSTERS; ++t) {
+                            real best = 0;
+#pragma clang loop unroll(full)
+                            for (int u = 0; u < CLUSTER; ++u) {
+                                const int k = CLUSTER * t + u;
+                                real dx = xj - own[0][k][l], dy = yj - own[1][k][l];
+                                real dz = zj - own[2][k][l];
+                                if (wide) dx = image(dx, 0), dy = image(dy, 1), dz = image(dz, 2);
+                                const real r2 = dx * dx + dy * dy + dz * dz;
+                                best = u == 0 || r2 < best ? r2 : best;
+                            }
+                            hit[t][l] = best < R2;
+                        }
                     }
-                }
-            };
-            struct Near { enum { wide = 0 }; };
-            struct Wide { enum { wide = 1 }; };
-            if (near) look(Near()); else look(Wide());
-            const int there = block_end[other] - s < SUPER ? block_end[other] - s : SUPER;
-            for (int t = 0; t < clusters; ++t)
-                for (int h = 0; h < SUPER; h += 8) {
-                    unsigned long long word;
-                    __builtin_memcpy(&word, hit[t] + h, 8);
-                    unsigned mask = (word * 0x0102040810204080ull) >> 56;
-                    if (there - h < 8) mask &= there > h ? (1u << (there - h)) - 1 : 0;
-                    if (sp == q && CLUSTER * t / 8 * 8 == h) mask &= ~(0xfu << (CLUSTER * t % 8));
+                };
+                struct Near { enum { wide = 0 }; };
+                struct Wide { enum { wide = 1 }; };
+                if (near) look(Near()); else look(Wide());
+                const unsigned there = first_of(block_end[other] - s);
+                for (int t = 0; t < clusters; ++t) {
+                    unsigned mask = bits_of(hit[t]) & there;
+                    if (sp == q) mask &= ~(0xfu << (CLUSTER * t));
                     if (!mask) continue;
-                    if (n[t] + LEAST > space[t] && out[t] != lost) move(t);
-                    // All eight are written, those behind the hits to be overwritten.
-                    Bytes chosen;
-                    __builtin_memcpy(&chosen, LANES + mask, sizeof(chosen));
-                    const Ints slots = __builtin_convertvector(chosen, Ints) + (s + h);
-                    __builtin_memcpy(out[t] == lost ? lost : out[t] + n[t], &slots, sizeof(slots));
-                    n[t] += __builtin_popcount(mask);
+                    const int few = __builtin_popcount(mask & 0xff);
+                    if (n[t] + few + LEAST > space[t] && out[t] != lost) move(t);
+                    int* to = out[t] == lost ? lost : out[t] + n[t];
+                    put(to, s, mask & 0xff);
+                    put(to + few, s + 8, mask >> 8);
+                    n[t] += few + __builtin_popcount(mask >> 8);
                 }
+            }
         }
 }
 for (int t = 0; t < clusters; ++t) {

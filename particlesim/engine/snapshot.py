@@ -12,9 +12,8 @@ from collections.abc import Iterable
 import numpy as np
 import warp as wp
 
-from ..kernels.engine.copy import copy_kernel
 from ..scene.part import Part
-from .execution.launch import launch
+from .execution.copies import copy
 from .loop import Loop
 from .observers import Observer
 
@@ -54,8 +53,7 @@ class Snapshot:
     def take(self) -> None:
         """Copy the present; recorded as part of the frame."""
         for name, array in self.arrays.items():
-            inputs = [array, self.copies[name]]
-            launch(copy_kernel(array.dtype), len(array), inputs, array.device)
+            copy(self.loop.model, array, self.copies[name])
 
     def restore(self) -> None:
         """Go back; neighbour rows are made again from the positions that they were made from.

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ..kernels.engine.copy import zero_kernel
-from .execution.launch import launch
+from .execution.copies import zero
 from .model import Model
 
 # The engine's own arrays: None for numbers, 3 for vectors, 9 for matrices.
@@ -132,8 +131,7 @@ class State:
         """Set all forces, and how they answer to velocities, to zero where there are any."""
         for name in ("force", "force_slope", "implicit_force"):
             if name in self.arrays:
-                array = self.arrays[name]
-                launch(zero_kernel(array.dtype), self.count, [array], array.device)
+                zero(self._model, self.arrays[name])
 
     def reset(self, worlds: Iterable[int]) -> None:
         """Put the rows of these worlds back to their start values."""

@@ -84,7 +84,17 @@ def _even_laws(n: int, m: int) -> tuple[Law, Law]:
         s = sigma * sigma * inverse
         return strength * (float(n) * power_n(s) - float(m) * power_m(s)) * inverse
 
-    return mie_squared, mie_force_over_r
+    @law
+    def twice_force_over_r(
+        distance_squared: float, strength: float, sigma: float, u_cut: float, f_cut: float,
+        cut: float,
+    ):  # fmt: skip
+        inverse = 1.0 / distance_squared
+        power = power_m(sigma * sigma * inverse)
+        # What is the same for all pairs stands together.
+        return (float(n) * strength * power - float(m) * strength) * power * inverse
+
+    return mie_squared, twice_force_over_r if n == 2 * m else mie_force_over_r
 
 
 class LennardJones(Pair):

@@ -80,7 +80,7 @@ class ClusterRows:
         result.cluster = model.array(begin[block_of] + SUPER // CLUSTER * within, wp.int32)
         for name in ("middle", "half"):
             planes = wp.zeros(
-                (3, int(first[-1])), dtype=model.precision.scalar, device=model.device
+                (3, int(first[-1]) + SUPER), dtype=model.precision.scalar, device=model.device
             )
             setattr(result, name, planes)
         self.super_count = int(first[-1])
@@ -136,7 +136,7 @@ class ClusterRows:
         struct.room = model.array(room, wp.int32)
         struct.row = model.array(begin[:-1], wp.int64)
         struct.cluster = model.array(listed.edges[:-1], wp.int32)
-        listed.pairs.row = wp.zeros(len(found), dtype=wp.int64, device=model.device)
+        listed.pairs.row = wp.zeros(len(found) + 1, dtype=wp.int64, device=model.device)
         listed.pairs.entry_stride = 1
         self.attic = Attic()
         self.attic.first = model.array(first, wp.int64)

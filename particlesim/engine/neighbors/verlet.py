@@ -140,13 +140,15 @@ class VerletList(AllPairs):
     def update(self, state: State, *, for_constraint: bool = False) -> None:
         """Rebuild the rows of worlds in which something moved, and the slot-ordered copies."""
         model, device = self.model, self.model.device
-        flag = kernels.moved_kernel(model.precision, model.periodic)
+        block = kernels.BLOCK if model.vectorised else 1
+        flag = kernels.moved_kernel(model.precision, model.periodic, block)
         launch(
             flag,
             self.count,
             [self.members, self.world, model.box, self.margins_squared[for_constraint],
              state.position, self.x_listed, self.moved, self.any_moved],
             device,
+            block,
         )  # fmt: skip
         with when(self.any_moved):
             self._take(state)

@@ -30,12 +30,12 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ...engine.execution.copies import copy, zero
 from ...engine.execution.launch import launch, owner
 from ...engine.loop import Loop
 from ...engine.model import Model, filled
 from ...engine.observers import FOLLOW, FORCE, PROJECT, Observer
 from ...engine.state import State
-from ...kernels.engine.copy import copy_kernel, zero_kernel
 from ...kernels.instruments.ledger import TOTALS, account_kernel, change_kernel, ledger_type
 from ..diagnostics import blocks
 
@@ -94,8 +94,7 @@ class Accounts(Observer):
                 if each.acts and self.halves:
                     self._copy(each.late, each.early)
                 elif not each.acts:
-                    launch(zero_kernel(each.early.dtype), len(each.early), [each.early],
-                           self.model.device)  # fmt: skip
+                    zero(self.model, each.early)
 
     def before(self, part: Any, stage: str) -> None:
         with owner("ledger"):
@@ -132,7 +131,7 @@ class Accounts(Observer):
         return state.correction if stage == PROJECT else state.velocity
 
     def _copy(self, source: wp.array, target: wp.array) -> None:
-        launch(copy_kernel(source.dtype), len(source), [source, target], self.model.device)
+        copy(self.model, source, target)
 
     # What outlives a substep ------------------------------------------------------------------
 

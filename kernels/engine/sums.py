@@ -1,0 +1,65 @@
+"""Sums over particles, in float64 and in an order of their own."""
+
+import functools
+
+import warp as wp
+
+from ..precision import Precision, function, register
+
+QUANTITIES = 10  # mass, momentum (3), angular momentum (3), kinetic, potential, virial
+
+
+def widened(precision: Precision) -> wp.Function:
+    """``wide(v)``: a vector in float64."""
+    vec3 = precision.vec3
+
+    def wide(v: vec3):
+        return wp.vec3d(wp.float64(v[0]), wp.float64(v[1]), wp.float64(v[2]))
+
+    return function(wide)
+
+
+@functools.cache
+def block_sums_kernel(precision: Precision) -> wp.Kernel:
+    """Kernel: one thread sums one block of particles, one after the other, in float64."""
+    vec3, real, wide = precision.vec3, precision.scalar, widened(precision)
+
+    @register
+    def block_sums(
+        first: int,
+        begin: wp.array(dtype=wp.int32),
+        end: wp.array(dtype=wp.int32),
+        x: wp.array(dtype=vec3),
+        v: wp.array(dtype=vec3),
+        m: wp.array(dtype=real),
+        w: wp.array(dtype=real),
+        energy: wp.array(dtype=wp.float64),
+        virial: wp.array(dtype=wp.float64),
+        sums_out: wp.array2d(dtype=wp.float64),
+    ):
+        b = first + wp.tid()
+        mass = wp.float64(0.0)
+        p = wp.vec3d()
+        angular = wp.vec3d()
+        kinetic = wp.float64(0.0)
+        potential = wp.float64(0.0)
+        total_virial = wp.float64(0.0)
+        for i in range(begin[b], end[b]):
+            m_i = wp.float64(m[i])
+            mass += m_i
+            if w[i] > real(0.0):  # a pinned particle's momentum is not the scene's
+                v_i = wide(v[i])
+                p += m_i * v_i
+                angular += m_i * wp.cross(wide(x[i]), v_i)
+                kinetic += wp.float64(0.5) * m_i * wp.dot(v_i, v_i)
+            potential += energy[i]
+            total_virial += virial[i]
+        sums_out[b, 0] = mass
+        for a in range(3):
+            sums_out[b, 1 + a] = p[a]
+            sums_out[b, 4 + a] = angular[a]
+        sums_out[b, 7] = kinetic
+        sums_out[b, 8] = potential
+        sums_out[b, 9] = total_virial
+
+    return block_sums
