@@ -31,11 +31,11 @@ def copy_kernel(dtype: Any, block: int = 1) -> wp.Kernel:
     copy = native(copy_natively, f"__builtin_memcpy({there}, {here}, {_size(dtype)});", False)
 
     @functools.partial(register, cpu_only=True)
-    def copy_blocks(first: int, source: wp.array(dtype=dtype), target_out: wp.array(dtype=dtype)):
+    def copy_rows(first: int, source: wp.array(dtype=dtype), target_out: wp.array(dtype=dtype)):
         i = (first + wp.tid()) * wp.static(block)
         copy(i, wp.min(i + wp.static(block), source.shape[0]), source, target_out)
 
-    return copy_blocks
+    return copy_rows
 
 
 @functools.cache
@@ -56,11 +56,11 @@ def zero_kernel(dtype: Any, block: int = 1) -> wp.Kernel:
     )
 
     @functools.partial(register, cpu_only=True)
-    def zero_blocks(first: int, target_out: wp.array(dtype=dtype)):
+    def zero_rows(first: int, target_out: wp.array(dtype=dtype)):
         i = (first + wp.tid()) * wp.static(block)
         zero(i, wp.min(i + wp.static(block), target_out.shape[0]), target_out)
 
-    return zero_blocks
+    return zero_rows
 
 
 def _bytes(array: str, dtype: Any) -> str:

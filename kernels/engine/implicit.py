@@ -6,8 +6,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from ..precision import Precision, function, register
-from .integrate import motion_type
-from .sums import widened
+from .integrate import motion_type, widened
 
 
 def _narrowed(precision: Precision) -> wp.Function:

@@ -31,6 +31,16 @@ def motion_type(precision: Precision) -> Any:
     return structure(f"Motion_{precision.name}", fields)
 
 
+def widened(precision: Precision) -> wp.Function:
+    """``wide(v)``: a vector in float64."""
+    vec3 = precision.vec3
+
+    def wide(v: vec3):
+        return wp.vec3d(wp.float64(v[0]), wp.float64(v[1]), wp.float64(v[2]))
+
+    return function(wide)
+
+
 def compensated_sum(kind: Any) -> wp.Function:
     """``add(x, dx, e) -> (sum, error)``, of vectors or numbers: what the sum rounds away goes with
     the next one's dx (Kahan 1965).

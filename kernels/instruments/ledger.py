@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from ..engine.sums import widened
+from ..engine.integrate import widened
 from ..precision import Precision, register, structure
 
 TOTALS = wp.types.vector(length=7, dtype=wp.float64)  # work, impulse (3), angular impulse (3)

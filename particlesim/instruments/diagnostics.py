@@ -15,7 +15,7 @@ from ..engine.execution.launch import launch
 from ..engine.loop import Loop, Source
 from ..engine.model import Model
 from ..engine.report import Report, grid
-from ..kernels.engine.sums import QUANTITIES, block_sums_kernel
+from ..kernels.instruments.sums import QUANTITIES, block_sums_kernel
 from ..kernels.precision import FLOAT64
 
 SHOWN = 20  # worlds of a table

@@ -4,19 +4,10 @@ import functools
 
 import warp as wp
 
-from ..precision import Precision, function, register
+from ..engine.integrate import widened
+from ..precision import Precision, register
 
 QUANTITIES = 10  # mass, momentum (3), angular momentum (3), kinetic, potential, virial
-
-
-def widened(precision: Precision) -> wp.Function:
-    """``wide(v)``: a vector in float64."""
-    vec3 = precision.vec3
-
-    def wide(v: vec3):
-        return wp.vec3d(wp.float64(v[0]), wp.float64(v[1]), wp.float64(v[2]))
-
-    return function(wide)
 
 
 @functools.cache
