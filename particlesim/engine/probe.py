@@ -15,7 +15,7 @@ from .limit import Limit
 from .loop import Loop
 from .model import Model
 from .rates import Rates, implicit_rates, turns
-from .spectrum import Largest, largest
+from .spectrum import Largest, largest, size_of
 
 STEPS, LEAST = 30, 4  # applications of a Jacobian
 WORK = 2e7  # particles and pairs that forces are evaluated for
@@ -209,8 +209,8 @@ class Probe:
             ahead, behind = ((at + way * moved).astype(real).astype(float) for way in (1, -1))
             with np.errstate(invalid="ignore", over="ignore"):  # not finite: told as such
                 gain = self.force(parts, **{what: ahead}) - self.force(parts, **{what: behind})
-            twice = 2.0 * np.linalg.norm(((ahead - behind)[mobile] / root).ravel()) or 1.0
             done = (ahead - behind)[mobile] / root
+            twice = 2.0 * size_of(done) or 1.0
             return 2.0 * done.ravel() / twice, (-2.0 / twice * root * gain[mobile]).ravel()
 
         return apply

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -59,11 +60,11 @@ def largest(
     count = len(start)
     steps = min(steps, count)
     basis, images = np.zeros((steps, count)), np.zeros((steps, count))
-    q, found = start / np.linalg.norm(start), Largest(0.0, 0.0, np.zeros(count), 0)
+    q, found = start / size_of(start), Largest(0.0, 0.0, np.zeros(count), 0)
     for k in range(steps):
         basis[k], images[k] = apply(q)
         found = _ritz(basis[: k + 1], images[: k + 1])
-        scale = np.linalg.norm(images[k])
+        scale = size_of(images[k])
         if not np.isfinite(scale) or found.residual <= tolerance * found.size:
             break
         most = found.size * count ** (1.0 / (2 * k + 1))
@@ -71,16 +72,38 @@ def largest(
             return replace(found, residual=most - found.size)
         q = images[k] / scale if scale > 0.0 else images[k]
         for _ in range(2):  # once leaves what rounding makes of nearly parallel vectors
-            q = q - basis[: k + 1].T @ _solve(basis[: k + 1], basis[: k + 1] @ q)
-        size = np.linalg.norm(q)
+            along = _solve(basis[: k + 1], _products(basis[: k + 1], q[None])[:, 0])
+            q = q - _sum(along, basis[: k + 1])
+        size = size_of(q)
         if size <= 0.1 * tolerance:
             break
         q /= size
     return found
 
 
+# Over all particles without BLAS: its threads go on spinning for a while on the cores of our own.
+
+
+def _products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Of each row of one with each row of the other."""
+    return np.einsum("in,jn->ij", a, b)
+
+
+def _sum(weights: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    return np.einsum("k,kn->n", weights, rows)
+
+
+def size_of(v: np.ndarray) -> float:
+    """The norm of all its numbers."""
+    return math.sqrt(float(np.sum(v.real**2 + v.imag**2)))
+
+
 def _solve(basis: np.ndarray, right: np.ndarray) -> np.ndarray:
-    return np.linalg.lstsq(basis @ basis.T, right, rcond=None)[0]
+    """What times Q^T Q is ``right``, of least size where directions are missing."""
+    values, vectors = np.linalg.eigh(_products(basis, basis))
+    kept = values > len(values) * np.finfo(float).eps * values[-1]
+    along = vectors[:, kept]
+    return (along / values[kept]) @ (along.T @ right)
 
 
 def _ritz(basis: np.ndarray, images: np.ndarray) -> Largest:
@@ -88,9 +111,9 @@ def _ritz(basis: np.ndarray, images: np.ndarray) -> Largest:
     count = basis.shape[1]
     if not np.isfinite(images).all():
         return Largest(np.inf, 0.0, np.ones(count), len(basis))
-    values, vectors = np.linalg.eig(_solve(basis, basis @ images.T))
+    values, vectors = np.linalg.eig(_solve(basis, _products(basis, images)))
     top = int(np.argmax(np.abs(values)))
-    z = vectors[:, top] @ basis
-    norm = np.linalg.norm(z)
-    residual = np.linalg.norm(vectors[:, top] @ images - values[top] * z) / norm
+    z = _sum(vectors[:, top], basis)
+    norm = size_of(z)
+    residual = size_of(_sum(vectors[:, top], images) - values[top] * z) / norm
     return Largest(float(abs(values[top])), float(residual), np.abs(z) / norm, len(basis), values)

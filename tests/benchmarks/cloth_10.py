@@ -3,6 +3,6 @@
 import cloth
 
 
-def case(side: int = 101, frames: int = 1):
+def case(side: int = 101, frames: int = 10):
     """See cloth.py."""
     return cloth.case(side, 10, frames)
