@@ -18,31 +18,32 @@ from .constraints import bodies_type, place_function, rounding_function
 from .contact import contact_types
 
 
-def _separation_function(precision: Precision) -> wp.Function:
-    """Distance and direction of a pair, also of a coincident one, without a branch.
+def _apart_function(precision: Precision) -> wp.Function:
+    """``apart(a, b, x_ij, r2, closest_squared)``: what a pair is apart by, and its square.
 
-    Coincident particles get one of eight directions by the difference of their slots a and b:
-    opposite for the two, the same in a batch as alone, and not all in one line.
+    Coincident particles, of slots a and b, are taken as 1 apart in one of eight directions by the
+    difference of their slots: opposite for the two, the same in a batch as alone, and not all in
+    one line.
     """
     vec3, real = precision.vec3, precision.scalar
     ax, ay, az = map(precision.scalar, APART)
 
-    def separation(a: int, b: int, x_ij: vec3, r2: real, closest_squared: real):
-        apart = r2 > closest_squared
-        r = wp.sqrt(wp.where(apart, r2, closest_squared))
+    def apart(a: int, b: int, x_ij: vec3, r2: real, closest_squared: real):
         k = wp.abs(a - b)
-        side = wp.where(apart, real(0.0), wp.where(a < b, real(-1.0), real(1.0)))
+        side = wp.where(a < b, real(-1.0), real(1.0))
         nx = wp.where((k & 1) == 0, ax, -ax)
         ny = wp.where((k & 2) == 0, ay, -ay)
         nz = wp.where((k & 4) == 0, az, -az)
-        n = x_ij * (wp.where(apart, real(1.0), real(0.0)) / r) + vec3(nx, ny, nz) * side
-        return r, n
+        together = wp.where(r2 > closest_squared, real(0.0), side)
+        there = wp.where(r2 > closest_squared, real(1.0), real(0.0))
+        x = x_ij * there + vec3(nx, ny, nz) * together
+        return x, wp.where(r2 > closest_squared, r2, real(1.0))
 
-    return function(separation)
+    return function(apart)
 
 
 def _of_pairs(precision: Precision) -> tuple[wp.Function, wp.Function, wp.Function]:
-    """What terms take of a pair: ``separation`` as above; ``both(a, i, j)``, the sum of the two's
+    """What terms take of a pair: ``apart`` as above; ``both(a, i, j)``, the sum of the two's
     numbers in an array, and ``between(a, i, j)``, the difference of their vectors.
     """
     real, vec3 = precision.scalar, precision.vec3
@@ -54,24 +55,24 @@ def _of_pairs(precision: Precision) -> tuple[wp.Function, wp.Function, wp.Functi
     def between(a: wp.array(dtype=vec3), i: int, j: int):
         return vector(a, i) - vector(a, j)
 
-    return _separation_function(precision), function(both), function(between)
+    return _apart_function(precision), function(both), function(between)
 
 
 def crowding_term(precision: Precision, params: Any, bounce: bool) -> Term:
     """Term: n n^T of a pair in contact, as its six entries; bounce: that approached at first."""
     vec3, real, six = precision.vec3, precision.scalar, precision.vector(6)
-    (Data, _), (separation, both, between) = contact_types(precision), _of_pairs(precision)
+    (Data, _), (apart, both, between) = contact_types(precision), _of_pairs(precision)
 
     def crowding(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
-        r, n = separation(d.slot[i], d.slot[j], x_ij, r2, p.closest_squared)
-        weight = wp.where(r < both(d.radius, i, j), real(1.0), real(0.0))
+        n, n2 = apart(d.slot[i], d.slot[j], x_ij, r2, p.closest_squared)
+        reach = both(d.radius, i, j)
+        touching = r2 < reach * reach
         if wp.static(bounce):
-            approach = wp.dot(n, between(d.way, i, j))
-            weight = wp.where(approach < real(0.0), weight, real(0.0))
-        m = n * weight
+            touching = touching and wp.dot(n, between(d.way, i, j)) < real(0.0)
+        m = n * (wp.where(touching, real(1.0), real(0.0)) / n2)
         return six(m[0] * n[0], m[0] * n[1], m[0] * n[2], m[1] * n[1], m[1] * n[2], m[2] * n[2])
 
-    return Term(function(crowding), 6, rounding=None, placed=False)
+    return Term(function(crowding), 6, rounding=None, placed=False, stored_in_line=True)
 
 
 def largest_eigenvalue(precision: Precision) -> wp.Function:
@@ -95,13 +96,10 @@ def largest_eigenvalue(precision: Precision) -> wp.Function:
 
     def bound(t: six):
         trace = t[0] + t[3] + t[5]
-        result = trace
-        if trace > real(0.0):
-            q = square(square(t / trace))
-            off = q[1] * q[1] + q[2] * q[2] + q[4] * q[4]
-            norm = q[0] * q[0] + q[3] * q[3] + q[5] * q[5] + real(2.0) * off
-            result = trace * wp.sqrt(wp.sqrt(wp.sqrt(norm)))
-        return result
+        q = square(square(t * (real(1.0) / wp.where(trace > real(0.0), trace, real(1.0)))))
+        off = q[1] * q[1] + q[2] * q[2] + q[4] * q[4]
+        norm = q[0] * q[0] + q[3] * q[3] + q[5] * q[5] + real(2.0) * off
+        return trace * wp.sqrt(wp.sqrt(wp.sqrt(norm)))
 
     return function(bound)
 
@@ -114,20 +112,21 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> Term:
     mu lam (Macklin et al. 2014, eq. 24), across the distance.
     """
     vec3, real, four = precision.vec3, precision.scalar, precision.vector(4)
-    (Data, _), (separation, both, between) = contact_types(precision), _of_pairs(precision)
+    (Data, _), (apart, both, between) = contact_types(precision), _of_pairs(precision)
 
     def push(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
-        r, n = separation(d.slot[i], d.slot[j], x_ij, r2, p.closest_squared)
+        x, x2 = apart(d.slot[i], d.slot[j], x_ij, r2, p.closest_squared)
         reach = both(d.radius, i, j)
-        touching = r < reach
+        touching = r2 < reach * reach
         u = between(d.way, i, j)
         # A pair that has passed through each other goes back the way it came.
         y = x_ij - u
         y2 = wp.dot(y, y)
         through = wp.dot(y, x_ij) < real(0.0) and y2 > p.closest_squared
         turned = wp.where(through, real(1.0), real(0.0))
-        n = n * (real(1.0) - turned) + y * (turned / wp.sqrt(wp.where(through, y2, real(1.0))))
-        r = wp.where(through, wp.dot(n, x_ij), r)
+        n = x * (real(1.0) - turned) + y * turned
+        n = n / wp.sqrt(wp.where(through, y2, x2))
+        r = wp.dot(n, x_ij)
         share = both(d.share, i, j)
         soft = share + p.compliance * d.inverse_dt * d.unit * d.inverse_dt
         active = touching and share > real(0.0)
@@ -138,8 +137,10 @@ def contact_term(precision: Precision, params: Any, friction: bool) -> Term:
             length = wp.sqrt(wp.dot(t, t))
             split = both(d.grip, i, j)
             split = wp.where(split > real(0.0), split, real(1.0))  # of two pinned ones: nothing
-            limit = p.friction * lam / wp.where(length > real(0.0), length, real(1.0))
-            result = result - t * wp.min(real(1.0) / split, limit)
+            most = p.friction * lam
+            slides = most * split < length
+            part = wp.where(slides, most, real(1.0)) / wp.where(slides, length, split)
+            result = result - t * part
         return four(result[0], result[1], result[2], lam * r)
 
     return Term(function(push), 4, rounding=None, placed=False)
@@ -152,10 +153,11 @@ def bounce_term(precision: Precision, params: Any) -> Term:
     what rests under gravity does not bounce.
     """
     vec3, real, four = precision.vec3, precision.scalar, precision.vector(4)
-    (Data, _), (separation, both, between) = contact_types(precision), _of_pairs(precision)
+    (Data, _), (apart, both, between) = contact_types(precision), _of_pairs(precision)
 
     def bounce(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: params):
-        r, n = separation(d.slot[i], d.slot[j], x_ij, r2, p.closest_squared)
+        n, n2 = apart(d.slot[i], d.slot[j], x_ij, r2, p.closest_squared)
+        n = n / wp.sqrt(n2)
         reach = both(d.radius, i, j)
         share = both(d.share, i, j)
         before = wp.dot(between(d.way, i, j), n)
@@ -163,7 +165,7 @@ def bounce_term(precision: Precision, params: Any) -> Term:
         touching = r2 < reach * reach and share > real(0.0)
         hit = touching and before < real(0.0) and missing > real(0.0)
         impulse = wp.where(hit, missing, real(0.0)) / wp.where(hit, share, real(1.0))
-        return four(n[0] * impulse, n[1] * impulse, n[2] * impulse, impulse * r)
+        return four(n[0] * impulse, n[1] * impulse, n[2] * impulse, impulse * wp.dot(n, x_ij))
 
     return Term(function(bounce), 4, rounding=None, placed=False)
 

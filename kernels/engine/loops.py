@@ -55,6 +55,7 @@ class Term:
         rounding: As the compiler may have it: a product and a sum in one; or ``"any"``, with
             products of reciprocals in place of quotients, and in any order, too. None: as written.
         placed: Its positions are places in the box, and not seen from somewhere.
+        stored_in_line: What stores the sums has no branch: several slots at once.
     """
 
     function: wp.Function
@@ -62,6 +63,7 @@ class Term:
     direction: tuple[float, float, float] | None = None
     rounding: str | None = "fused"
     placed: bool = True
+    stored_in_line: bool = False
 
     @property
     def returned(self) -> int:

@@ -2,7 +2,8 @@
 // a vector, OFF the first place of partners in the copies, TILE partners at a time, SIZE slots of a
 // cluster, WIDTH numbers of a sum, AT_ONCE slots served together, CENTRAL, LISTED, PERIODIC), the
 // arrays of the pairs, and: ROOM declares the copies of fields and `local`, which points to them;
-// COPY(to, at) copies those of a slot; GIVE(i, j, d, r2) is the term; STORE(slot, total) ends it.
+// COPY(to, at) copies those of a slot; GIVE(i, j, d, r2) is the term; STORE(slot, total) ends it, in
+// a loop that STORES stands before.
 
 const int a = lead[c], own = lead[c + 1] - a;
 const int w = world[a];
@@ -23,7 +24,8 @@ struct Near { enum { wide = 0 }; };
 struct Wide { enum { wide = 1 }; };
 
 alignas(64) real b[3][OFF + TILE], sum[SIZE][WIDTH][W] = {}, close[W];
-alignas(64) int id[TILE + W];
+alignas(64) int slots[OFF + TILE + W];
+int* id = slots + OFF;  // of the partners; own ones stand before them
 alignas(64) real apart[AT_ONCE][TILE];
 real push[SIZE] = {};
 const real never = (real)__builtin_inf();
@@ -64,7 +66,10 @@ auto place_own = [&]() __attribute__((always_inline)) {
             for (int n = 0; n < 3; ++n) b[n][u] = x[3 * (a + (u < own ? u : own - 1)) + n];
 };
 place_own();
-for (int u = 0; u < SIZE; ++u) { COPY(u, a + (u < own ? u : own - 1)) }
+for (int u = 0; u < SIZE; ++u) {
+    slots[u] = a + (u < own ? u : own - 1);
+    COPY(u, slots[u])
+}
 if (LISTED & periodic) {
     const real reach = __builtin_elementwise_sqrt(p.cutoff_squared);
     auto wide = V4{} != V4{}, out = wide;
@@ -231,6 +236,7 @@ for (int u = 0; u < SIZE; u += 4)
                      + __builtin_shufflevector(A, B, 1, 3, 5, 7);
         __builtin_memcpy(&total_of[s][u], &all, sizeof(all));
     }
+STORES
 for (int u = 0; u < own; ++u) {
     Total total;
     for (int s = 0; s < WIDTH; ++s) total[s] = total_of[s][u] + (CENTRAL ? push[u] * ASIDE[s] : 0);

@@ -97,11 +97,11 @@ def _macros(
     lanes = lane_count(precision)
     room, copy = ["auto local = d;"], []
     for k, (path, kind, width) in enumerate(fields):
+        if path.rpartition(".")[2] == "slot":  # it holds its own places
+            room.append(pointed(f"local.{path}", "slots", "sizeof(int)"))
+            continue
         room.append(f"alignas(64) {kind} copy{k}[{width} * (OFF + TILE) + 1];")
         room.append(pointed(f"local.{path}", f"copy{k}", f"{width} * sizeof({kind})"))
-        if path.rpartition(".")[2] == "slot":  # it holds its own places
-            copy.append(f"copy{k}[to] = at;")
-            continue
         # A vector of three as four, of which the last is the next one's, or spare.
         many = 4 if width == 3 else width
         copy.append(
@@ -119,5 +119,7 @@ def _macros(
         "GIVE(i, j, dx, dy, dz, r2)":
             f"{native_name(term.function)}(i, j, {vec}(dx, dy, dz), r2, local, p)",
         "STORE(slot, total)": f"{native_name(store)}(slot, order[slot], total, d, p, o);",
+        "STORES": '_Pragma("clang loop vectorize(assume_safety) vectorize_width(4)")'
+            if term.stored_in_line else "",
         "IN_FOURS(v)": " + ".join(f"__builtin_shufflevector(v, v, {each})" for each in fours),
     }  # fmt: skip

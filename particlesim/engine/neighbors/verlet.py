@@ -27,7 +27,7 @@ from .hash_rows import HashRows
 
 # Skin over cutoff, where Settings leaves it open; measured. Grains have few partners, so that rows
 # cost little to hold and much to make.
-SKIN, SKIN_OF_CONTACTS = 0.12, 0.2
+SKIN, SKIN_OF_CONTACTS = 0.12, 0.4
 DIRECT = 8192  # largest world that CUDA looks through directly; measured
 
 
