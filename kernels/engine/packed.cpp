@@ -3,7 +3,7 @@
 // cluster, WIDTH numbers of a sum, AT_ONCE slots served together, CENTRAL, LISTED, PERIODIC), the
 // arrays of the pairs, and: ROOM declares the copies of fields and `local`, which points to them;
 // COPY(to, at) copies those of a slot; GIVE(i, j, d, r2) is the term; STORE(slot, total) ends it, in
-// a loop that STORES stands before.
+// a loop that STORES stands before; TOUCH(particle) fetches what it will add to.
 
 const int a = lead[c], own = lead[c + 1] - a;
 const int w = world[a];
@@ -13,7 +13,8 @@ const int all = LISTED ? count[c] : end[w] - base;
 const int partners = p.cutoff_squared > 0 ? all : 0;
 const int* listed = index + (LISTED ? row[c] : 0);
 if (LISTED)
-    for (int k = 0; k < all; k += 16) __builtin_prefetch(index + row[c + 1] + k);
+    for (int k = 0; k < all; k += 16) __builtin_prefetch(index + row[c + 2] + k);
+for (int u = 0; u < own; ++u) { TOUCH(order[a + u]) }
 
 typedef real V4 __attribute__((vector_size(4 * sizeof(real))));
 typedef real VW __attribute__((vector_size(W * sizeof(real))));

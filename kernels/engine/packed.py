@@ -47,6 +47,10 @@ def packed_loop(
     total, unit = precision.vector(term.width), precision.scalar(1.0)
     numbers, arrays = _numbers(term, precision, periodic, partners == ROWS), _arrays()
     macros = _macros(term, store, list(_fields(data, precision)), precision)
+    macros["TOUCH(particle)"] = " ".join(
+        f"__builtin_prefetch({elements(f'o.{path}', kind)} + {width} * (long long)(particle), 1);"
+        for path, kind, width in _fields(out, precision)
+    )
     snippet = row_moves(precision, spare=True) + body(
         "engine/packed.cpp", precision, numbers, arrays, macros
     )

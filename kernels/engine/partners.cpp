@@ -39,6 +39,7 @@ const long long attic_begin = attic_first[w], attic_end = attic_first[w + 1];
 for (int t = 0; t < clusters; ++t) {
     row[c0 + t] = block_row[b] + (long long)room * (c0 + t - block_cluster[b]);
     out[t] = index + row[c0 + t], space[t] = room;
+    for (int k = 0; k < room; k += 16) __builtin_prefetch(out[t] + k, 1);  // lines to write to
     for (int k = CLUSTER * t; k < size && k < CLUSTER * (t + 1); ++k) out[t][n[t]++] = lead + k;
 }
 // A row that is full goes on in the attic of its world, in twice the space.

@@ -136,7 +136,7 @@ class ClusterRows:
         struct.room = model.array(room, wp.int32)
         struct.row = model.array(begin[:-1], wp.int64)
         struct.cluster = model.array(listed.edges[:-1], wp.int32)
-        listed.pairs.row = wp.zeros(len(found) + 1, dtype=wp.int64, device=model.device)
+        listed.pairs.row = wp.zeros(len(found) + 2, dtype=wp.int64, device=model.device)
         listed.pairs.entry_stride = 1
         self.attic = Attic()
         self.attic.first = model.array(first, wp.int64)
