@@ -18,7 +18,7 @@ from .engine.columns import SUPER, columns_type
 from .engine.loops import ROWS, Pairs, Periodicity, Term, box_type
 from .engine.neighbors import blocks_type
 from .engine.packed import AHEAD, CLUSTER
-from .engine.partners import Attic, partners_kernel
+from .engine.partners import Pool, partners_kernel
 from .interactions.pair import pair_kernel
 from .precision import FLOAT64, function, structure, translate
 from .warp_internals import WRITTEN_FOR, Packed
@@ -124,14 +124,13 @@ def _given() -> Pairs:
 def _found() -> Pairs:
     """Rows of clusters as they are found."""
     pairs, real = _pairs(CLUSTER, AHEAD), FLOAT64.scalar
-    attic = Attic()
-    attic.first, attic.taken = wp.array([2 * AHEAD] * 2, dtype=wp.int64), _whole([0])
+    rows = Pool()
+    rows.first, rows.taken = wp.array([0, 2 * AHEAD], dtype=wp.int64), _whole([0])
     columns = np.zeros(1, dtype=columns_type(FLOAT64).numpy_dtype())
     columns["end"] = N
     blocks, supers = blocks_type(FLOAT64)(), supers_type(FLOAT64)()
     blocks.of, blocks.begin, blocks.end = _whole([0] * N), _whole([0]), _whole([N])
-    blocks.room, blocks.first, blocks.cluster = _whole([AHEAD]), _whole([0, 1]), _whole([0])
-    blocks.row = wp.array([0], dtype=wp.int64)
+    blocks.first = _whole([0, 1])
     blocks.reach_squared = wp.array([[1.0]], dtype=real)
     supers.lead, supers.block, supers.first = _whole([0]), _whole([0]), _whole([0, 1])
     supers.cluster = _whole([0])
@@ -142,7 +141,7 @@ def _found() -> Pairs:
     halve = halving_kernels(FLOAT64, OPEN)
     wp.launch(halve.blocks, 1, [0, moved, laid, box, pairs.order, x, pairs.order, planes])
     wp.launch(halve.supers, 1, [0, moved, laid, box, supers, pairs.order, planes])
-    looked = [0, moved, box, blocks, laid, _whole([0]), supers, attic, planes, pairs]
+    looked = [0, moved, box, blocks, laid, _whole([0]), supers, rows, planes, pairs]
     counts = [_whole([0, 0]), _whole([0])]
     wp.launch(partners_kernel(FLOAT64, OPEN), 1, [*looked, *counts])
     return pairs

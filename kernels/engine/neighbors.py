@@ -34,9 +34,7 @@ def blocks_type(precision: Precision) -> Any:
             "of": wp.array(dtype=wp.int32),  # slot -> block
             "begin": wp.array(dtype=wp.int32),  # block -> first slot
             "end": wp.array(dtype=wp.int32),  # block -> last slot + 1
-            "room": wp.array(dtype=wp.int32),  # block -> entries that a row has room for
-            "row": wp.array(dtype=wp.int64),  # block -> where its rows begin
-            "cluster": wp.array(dtype=wp.int32),  # block -> first cluster
+            "room": wp.array(dtype=wp.int32),  # block -> entries of a row, on CUDA
             "first": wp.array(dtype=wp.int32),  # world -> first block
             "reach_squared": wp.array2d(dtype=precision.scalar),  # block, other of its world
         },

@@ -1,6 +1,7 @@
 // The rows of the clusters of super q, in world w. What stands before it (see partners.py) names the
-// numbers (real, SUPER slots of a super, CLUSTER of a cluster, CLUSTERS of a super, LEAST entries of
-// a row, RUNS at most, MARGIN of a cell, PERIODIC, LANES of each mask of eight) and the arrays.
+// numbers (real, SUPER slots of a super, CLUSTER of a cluster, CLUSTERS of a super, LEAST entries
+// written at once, ROUNDED that rows are rounded up to, HERE of a row, RUNS at most, MARGIN of a
+// cell, PERIODIC, LANES of each mask of eight) and the arrays.
 
 typedef unsigned char Bytes __attribute__((vector_size(8)));
 typedef int Ints __attribute__((vector_size(32)));
@@ -11,7 +12,6 @@ const real *py = px + stride, *pz = py + stride;
 const int b = block_of[q], lead = leads[q];
 const int size = block_end[b] - lead < SUPER ? block_end[b] - lead : SUPER;
 const int c0 = cluster_of[q], clusters = (size + CLUSTER - 1) / CLUSTER;
-const int room = rooms[b];
 const real at[3] = {middle[q], middle[supers_n + q], middle[2 * supers_n + q]};
 const real reach[3] = {half[q], half[supers_n + q], half[2 * supers_n + q]};
 // A place or displacement, moved by as many boxes as bring displacement d to the nearest image; where
@@ -33,23 +33,25 @@ for (int k = 0; k < SUPER; ++k) {
     }
 }
 
+// Rows are made here and, once they are whole, go to the pool of their world. One that is longer goes
+// on in the pool, in twice the space each time.
+alignas(64) int here[CLUSTERS][HERE + SUPER];
 int* out[CLUSTERS];
 int n[CLUSTERS] = {}, space[CLUSTERS], lost[LEAST + SUPER];
-const long long attic_begin = attic_first[w], attic_end = attic_first[w + 1];
+auto take = [&](int many) -> int* {
+    const long long to = pool[w] + __atomic_fetch_add(taken + w, many, __ATOMIC_RELAXED);
+    return to + many <= pool[w + 1] ? index + to : nullptr;
+};
+auto move = [&](int t) {
+    int* to = take(2 * space[t]);
+    if (!to) { out[t] = lost; return; }
+    __builtin_memcpy(to, out[t], sizeof(int) * n[t]);
+    out[t] = to, space[t] *= 2;
+};
 for (int t = 0; t < clusters; ++t) {
-    row[c0 + t] = block_row[b] + (long long)room * (c0 + t - block_cluster[b]);
-    out[t] = index + row[c0 + t], space[t] = room;
-    for (int k = 0; k < room; k += 16) __builtin_prefetch(out[t] + k, 1);  // lines to write to
+    out[t] = here[t], space[t] = HERE;
     for (int k = CLUSTER * t; k < size && k < CLUSTER * (t + 1); ++k) out[t][n[t]++] = lead + k;
 }
-// A row that is full goes on in the attic of its world, in twice the space.
-auto move = [&](int t) {
-    const int more = 2 * space[t];
-    const long long to = attic_begin + __atomic_fetch_add(taken + w, more, __ATOMIC_RELAXED);
-    if (to + more > attic_end) { out[t] = lost; return; }
-    __builtin_memcpy(index + to, out[t], sizeof(int) * n[t]);
-    out[t] = index + to, space[t] = more, row[c0 + t] = to;
-};
 
 // The slots of a mask of eight. All eight are written, those behind to be overwritten.
 auto put = [](int* to, int s, unsigned mask) __attribute__((always_inline)) {
@@ -223,8 +225,20 @@ for (int other = world_first[w]; other < world_first[w + 1]; ++other) {
             }
         }
 }
+int whole = 0;
+auto rounded = [](int many) -> int { return (many + ROUNDED - 1) / ROUNDED * ROUNDED; };
+for (int t = 0; t < clusters; ++t) whole += out[t] == here[t] ? rounded(n[t]) : 0;
+int* to = take(whole);
 for (int t = 0; t < clusters; ++t) {
+    if (out[t] == here[t]) {
+        out[t] = to ? to : lost;
+        for (int k = 0; to && k < n[t]; k += ROUNDED)
+            __builtin_memcpy(to + k, here[t] + k, sizeof(int) * ROUNDED);
+        to += to ? rounded(n[t]) : 0;
+    }
+    const bool full = out[t] == lost;
     found[c0 + t] = n[t];
-    count[c0 + t] = out[t] == lost ? 0 : n[t];
-    if (out[t] == lost) overflowed[0] = 1;
+    row[c0 + t] = full ? 0 : out[t] - index;
+    count[c0 + t] = full ? 0 : n[t];
+    if (full) overflowed[0] = 1;
 }

@@ -14,7 +14,9 @@ from .neighbors import blocks_type
 from .packed import CLUSTER
 
 RUNS = 256  # of slots that one super looks at; if there are more it looks at all
-LEAST = 8  # entries that a row has room for, and that are written at once
+LEAST = 8  # entries that are written at once
+ROUNDED = 4  # entries that the rooms of rows are rounded up to
+HERE = 512  # entries of a row while it is made; of a longer one the pool holds what it had before
 MARGIN = 0.02  # of a cell, for the rounding of cells
 
 
@@ -24,11 +26,12 @@ def _lanes(mask: int) -> int:
 
 
 @wp.struct
-class Attic:
-    """Where rows go on that are full: entries of the index behind all rows, by world."""
+class Pool:
+    """Where the rows of each world are: entries of the index, from each one's first."""
 
     first: wp.array(dtype=wp.int64)  # world -> first entry, and at the end one more
-    taken: wp.array(dtype=wp.int32)  # world -> entries in use
+    taken: wp.array(dtype=wp.int32)  # world -> entries in use, or wanted where it was full
+    most: wp.array(dtype=wp.int32)  # world -> at most so many in any earlier rows
 
 
 def _look(precision: Precision, periodic: Periodicity) -> wp.Function:
@@ -39,18 +42,17 @@ def _look(precision: Precision, periodic: Periodicity) -> wp.Function:
     )  # fmt: skip
     numbers = {
         "SUPER": SUPER, "CLUSTER": CLUSTER, "CLUSTERS": SUPER // CLUSTER, "LEAST": LEAST,
-        "RUNS": RUNS, "PERIODIC": [int(on) for on in periodic],
+        "ROUNDED": ROUNDED, "HERE": HERE, "RUNS": RUNS, "PERIODIC": [int(on) for on in periodic],
     }  # fmt: skip
     arrays = {
         "px": "x", "middle": "supers.middle", "half": "supers.half",
         "reach_squared": "blocks.reach_squared", "int* super_first": "supers.first",
         "int* leads": "supers.lead", "int* block_of": "supers.block",
         "int* cluster_of": "supers.cluster", "int* block_begin": "blocks.begin",
-        "int* block_end": "blocks.end", "int* block_cluster": "blocks.cluster",
-        "int* rooms": "blocks.room", "long long* block_row": "blocks.row",
+        "int* block_end": "blocks.end",
         "int* world_first": "blocks.first", "int* starts": "starts_in",
         "int* index": "pairs.index", "int* count": "pairs.count", "long long* row": "pairs.row",
-        "long long* attic_first": "attic.first", "int* taken": "attic.taken",
+        "long long* pool": "rows.first", "int* taken": "rows.taken",
         "int* found": "found_out", "int* overflowed": "overflow",
     }  # fmt: skip
     macros = {
@@ -64,7 +66,7 @@ def _look(precision: Precision, periodic: Periodicity) -> wp.Function:
 
     def look(
         q: int, w: int, box: Box, blocks: Blocks, columns: wp.array(dtype=Columns),
-        starts_in: wp.array(dtype=wp.int32), supers: Supers, attic: Attic,
+        starts_in: wp.array(dtype=wp.int32), supers: Supers, rows: Pool,
         x: wp.array2d(dtype=precision.scalar), pairs: Pairs, found_out: wp.array(dtype=wp.int32),
         overflow: wp.array(dtype=wp.int32),
     ): ...  # fmt: skip
@@ -88,7 +90,7 @@ def partners_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
         columns_in: wp.array(dtype=Columns),
         starts_in: wp.array(dtype=wp.int32),
         supers: Supers,
-        attic: Attic,
+        rows: Pool,
         x: wp.array2d(dtype=real),
         pairs: Pairs,
         found_out: wp.array(dtype=wp.int32),
@@ -98,7 +100,7 @@ def partners_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
         w = pairs.world[supers.lead[q]]
         if moved[w] != 0:
             look(
-                q, w, box[w], blocks, columns_in, starts_in, supers, attic, x, pairs, found_out,
+                q, w, box[w], blocks, columns_in, starts_in, supers, rows, x, pairs, found_out,
                 overflow,
             )  # fmt: skip
 
@@ -106,15 +108,14 @@ def partners_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
 
 
 @functools.cache
-def attics_kernel() -> wp.Kernel:
-    """Kernel: nothing is in the attics of the worlds that have moved."""
+def pools_kernel() -> wp.Kernel:
+    """Kernel: nothing is in the pools of the worlds that have moved."""
 
     @functools.partial(register, cpu_only=True)
-    def empty_attics(
-        first: int, moved: wp.array(dtype=wp.int32), taken_out: wp.array(dtype=wp.int32)
-    ):
+    def empty_pools(first: int, moved: wp.array(dtype=wp.int32), rows_out: Pool):
         w = first + wp.tid()
         if moved[w] != 0:
-            taken_out[w] = 0
+            rows_out.most[w] = wp.max(rows_out.most[w], rows_out.taken[w])
+            rows_out.taken[w] = 0
 
-    return empty_attics
+    return empty_pools

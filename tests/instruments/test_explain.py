@@ -50,7 +50,7 @@ def test_a_lennard_jones_scene_has_no_density_and_no_previous_position(liquid, d
     # A list is rebuilt only if something has moved; then slots are in another order.
     names = [name for _, name, _ in found.conditional]
     if device == "cpu":
-        made = ["halve_blocks", "empty_attics", "halve_supers", "find_partners"]
+        made = ["halve_blocks", "empty_pools", "halve_supers", "find_partners"]
     else:
         made = ["spread", "direct_rows"]
     assert names == ["take_positions", *made]
@@ -65,7 +65,7 @@ def test_a_large_world_has_a_grid_and_a_small_one_has_none(liquid, device):
     assert "hash grid" in found.lists[0]
     names = [name for _, name, _ in found.conditional]
     sort = ["lay_columns", "number_bins", "sort_by_bins"]
-    rows = ["empty_attics", "halve_supers", "find_partners"]
+    rows = ["empty_pools", "halve_supers", "find_partners"]
     assert names == ["take_positions", *sort, *rows]
     assert "gather" in kernels(found)  # into the grid's order
     assert len(sim.neighbors.lists[0].grids) == 1

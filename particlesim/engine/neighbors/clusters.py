@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 from typing import Any
 
 import numpy as np
@@ -19,16 +18,16 @@ from ...kernels.engine.columns import (
     sort_kernel,
 )  # fmt: skip
 from ...kernels.engine.packed import AHEAD, CLUSTER
-from ...kernels.engine.partners import LEAST, Attic, attics_kernel, partners_kernel
+from ...kernels.engine.partners import HERE, LEAST, ROUNDED, Pool, partners_kernel, pools_kernel
 from ..execution.launch import call, launch, when
 from ..model import Model
 from .blocks import Block
 from .cells import slowest_last
 
-USUAL = 0.98  # of the rows are no longer than rows usually are
-ROOM = 1.2  # times that is what they have room for
-SPARE = 0.03  # of all rows: what the attic has beyond what is in it
-BINS_PER_PARTICLE = 2  # bounds the cost of clearing a grid
+# What a world's pool holds: so many times, and entries beyond, what is found at the start; and so
+# many times what is found once it was full, since there may be more and more.
+ROOM, SPARE, MORE = 1.1, 256, 1.2
+BINS_PER_PARTICLE = 0.75  # bounds the cost of clearing a grid; evenly spread, they take a half
 PADDING = 2 * SUPER  # planes may be read beyond their end
 
 
@@ -51,14 +50,19 @@ class ClusterRows:
         device, precision = model.device, model.precision
         self.large = [k for k, each in enumerate(blocks) if large[each.world] and each.count]
         self.small = [k for k, each in enumerate(blocks) if not large[each.world] and each.count]
-        self.room, self.attics = np.zeros(len(blocks), dtype=int), np.zeros(model.world_count)
+        self.pools = np.zeros(model.world_count, dtype=np.int64)  # entries
+        self.rows = Pool()
+        self.made = 0  # times: for as many as was guessed, for those of the start, for more
         self.planes = wp.zeros((3, listed.count + PADDING), dtype=precision.scalar, device=device)
         self.supers = self._supers()
-        most = {k: max(64, BINS_PER_PARTICLE * blocks[k].count) for k in self.large}
+        most = {k: max(64, int(BINS_PER_PARTICLE * blocks[k].count)) for k in self.large}
         self.columns = self._columns(most)
         self.starts = wp.zeros(sum(most.values()) + len(most), dtype=wp.int32, device=device)
         self.bins = wp.zeros(listed.count if most else 0, dtype=wp.int32, device=device)
-        self.places = wp.zeros(listed.count if most else 0, dtype=wp.vec3f, device=device)
+        # What a grid sorts stands where the sorted coordinates come to be.
+        self.places = wp.array(
+            ptr=self.planes.ptr, shape=listed.count, dtype=wp.vec3f, device=device
+        )
         self.grids = {}
         for k in self.large:
             grid = wp.HashGrid(LINE, -(-most[k] // LINE), 1, device=device)
@@ -108,49 +112,43 @@ class ClusterRows:
         return np.append(leads(blocks, CLUSTER), sum(block.count for block in blocks))
 
     def make_room(self, found: np.ndarray) -> int:
-        """Rows for as many as were found, by cluster, and more; returns how many entries.
-
-        A few are much longer than others. They go on in the attic, at twice the length, until all
-        are in; it is always made larger than it was.
-        """
+        """Pools for as many as were found, by cluster, and more; returns how many entries."""
         model, listed = self.model, self.listed
-        usual = [
-            np.quantile(found[a:b], USUAL) if b > a else 0.0
-            for a, b in itertools.pairwise(listed.edges)
-        ]
-        room = (np.ceil(np.array(usual) * ROOM / LEAST).astype(int) + 1) * LEAST
-        room = np.maximum(room, self.room)
-        counts = np.diff(listed.edges)
-        wanted = 2 ** np.ceil(np.log2(np.maximum(ROOM * found / np.repeat(room, counts), 1)))
+        entries = -(-found // ROUNDED) * ROUNDED
         # A row that has grown n-fold has left what it had on the way, 2 + 4 + ... + n.
-        longer = np.where(wanted > 1, (2 * wanted - 2) * np.repeat(room, counts), 0)
-        worlds = np.repeat([block.world for block in listed.blocks], counts)
-        attics = np.bincount(worlds, longer, minlength=model.world_count)
-        attics = attics + SPARE * np.bincount(
-            worlds, np.repeat(room, counts), minlength=model.world_count
-        )
-        attics = np.where(attics > 0, np.maximum(attics, 1.5 * self.attics) + room.max(), 0.0)
-        begin = np.concatenate([[0], np.cumsum(room * counts)])
-        first = begin[-1] + np.concatenate([[0], np.cumsum(np.ceil(attics).astype(int))])
-        struct = listed.struct
-        struct.room = model.array(room, wp.int32)
-        struct.row = model.array(begin[:-1], wp.int64)
-        struct.cluster = model.array(listed.edges[:-1], wp.int32)
+        folds = 2 ** np.ceil(np.log2(np.maximum((found + LEAST) / HERE, 1))).astype(np.int64)
+        entries = np.where(folds > 1, (2 * folds - 2) * HERE, entries)
+        world = np.repeat([block.world for block in listed.blocks], np.diff(listed.edges))
+        wanted = np.bincount(world, entries, minlength=model.world_count)
+        if self.made:  # in any substep of the frame, of which the last is what was found
+            wanted = np.maximum(wanted, np.maximum(self.rows.most.numpy(), self.rows.taken.numpy()))
+        room = np.where(wanted > self.pools, MORE if self.made > 1 else ROOM, 1.0)
+        wanted = np.where(wanted > 0, np.ceil(room * wanted) + SPARE, 0).astype(np.int64)
+        self.pools = np.maximum(self.pools, wanted)
+        self.made += 1
+        first = np.concatenate([[0], np.cumsum(self.pools)])
         listed.pairs.row = wp.zeros(len(found) + 2, dtype=wp.int64, device=model.device)
         listed.pairs.entry_stride = 1
-        self.attic = Attic()
-        self.attic.first = model.array(first, wp.int64)
-        self.attic.taken = wp.zeros(model.world_count, dtype=wp.int32, device=model.device)
-        self.room, self.attics = room, attics
+        self.rows = Pool()
+        self.rows.first = model.array(first, wp.int64)
+        self.rows.taken, self.rows.most = (
+            wp.zeros(model.world_count, dtype=wp.int32, device=model.device) for _ in range(2)
+        )
         return int(first[-1]) + AHEAD
+
+    @property
+    def capacity(self) -> int:
+        """Entries that there is room for, by row."""
+        return int(self.pools.sum() // max(1, self.listed.rows))
 
     def rebuild(self) -> None:
         """Make the rows of the worlds marked as moved."""
         model, listed, device = self.model, self.listed, self.model.device
-        for k in self.large:
-            w = listed.blocks[k].world
-            with when(listed.moved[w : w + 1]):
-                self._sort(k)
+        for stage in (self._number, self._sort):
+            for k in self.large:
+                w = listed.blocks[k].world
+                with when(listed.moved[w : w + 1]):
+                    stage(k)
         halve = halving_kernels(model.precision, model.periodic)
         if self.small:
             launch(
@@ -160,7 +158,7 @@ class ClusterRows:
                  listed.order, self.planes],
                 device,
             )  # fmt: skip
-        launch(attics_kernel(), model.world_count, [listed.moved, self.attic.taken], device)
+        launch(pools_kernel(), model.world_count, [listed.moved, self.rows], device)
         slots = self.super_count * SUPER
         inputs = [listed.moved, self.columns, model.box, self.supers, listed.order, self.planes]
         launch(halve.supers, slots, inputs, device, SUPER)
@@ -168,13 +166,13 @@ class ClusterRows:
             partners_kernel(model.precision, model.periodic),
             slots,
             [listed.moved, model.box, listed.struct, self.columns, self.starts, self.supers,
-             self.attic, self.planes, listed.pairs, listed.found, listed.overflow],
+             self.rows, self.planes, listed.pairs, listed.found, listed.overflow],
             device,
             SUPER,
         )  # fmt: skip
 
-    def _sort(self, k: int) -> None:
-        """Slots of a large block in the order of its columns."""
+    def _number(self, k: int) -> None:
+        """The columns of a large block, and which of their bins its members are in."""
         listed, device = self.listed, self.model.device
         block, (grid, places) = listed.blocks[k], self.grids[k]
         precision = self.model.precision
@@ -182,6 +180,11 @@ class ClusterRows:
         inputs = [k, self.columns, listed.x_listed, self.bins, self.places]
         launch(number_kernel(precision), block.count, inputs, device)
         call(functools.partial(grid.build, places, 1.0))
+
+    def _sort(self, k: int) -> None:
+        """Slots of a large block in the order of its columns."""
+        listed, device, precision = self.listed, self.model.device, self.model.precision
+        block, (grid, _) = listed.blocks[k], self.grids[k]
         launch(
             sort_kernel(precision),
             block.count,
@@ -212,4 +215,4 @@ class ClusterRows:
         """What it holds."""
         supers = [self.supers.lead, self.supers.block, self.supers.cluster, self.supers.middle,
                   self.supers.half]  # fmt: skip
-        return [self.planes, self.starts, self.bins, self.places, *supers]
+        return [self.planes, self.starts, self.bins, *supers]

@@ -77,6 +77,11 @@ class HashRows:
         listed.pairs.entry_stride = 1 if apart else max(1, listed.count)
         return total
 
+    @property
+    def capacity(self) -> int:
+        """Entries that the longest rows have room for."""
+        return int(self.room.max())
+
     def rebuild(self) -> None:
         """Make the rows of the worlds marked as moved."""
         for w in sorted({self.listed.blocks[k].world for k in self.grids}):

@@ -123,8 +123,8 @@ class VerletList(AllPairs):
 
     @property
     def capacity(self) -> int:
-        """Neighbours that the longest rows have room for."""
-        return int(self.layout.room.max())
+        """Entries of a row that there is room for."""
+        return self.layout.capacity
 
     def mark_all(self) -> None:
         """Have the next update rebuild every world."""
