@@ -195,6 +195,7 @@ def registered():
     return names
 
 
+@pytest.mark.parametrize("precision", ["float32", pytest.param("float64", marks=pytest.mark.slow)])
 def test_every_kernel_compiles(precision, launched, tmp_path):
     # All variants in float32, 0.15 s a kernel; in float64 one variant of each kernel at least.
     for name in SCENES if precision == "float32" else EVERY_KERNEL:
