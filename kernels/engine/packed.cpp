@@ -189,6 +189,7 @@ for (int tile = 0; tile < partners; tile += TILE) {
 #pragma clang loop unroll(full)
                     for (int u = 0; u < AT_ONCE; ++u) {
                         real dx = xj - at[u][0], dy = yj - at[u][1], dz = zj - at[u][2];
+                        if (wide && xj == FAR) dx = 0;  // its image may be infinitely far
                         if (wide) dx = image(dx, 0), dy = image(dy, 1), dz = image(dz, 2);
                         add(now[u], l, u0 + u, k, dx, dy, dz, apart[u][k0 + l]);
                     }

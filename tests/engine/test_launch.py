@@ -110,8 +110,9 @@ def test_rows_that_grow_within_a_run(execution, threads):
     (rows,) = roomy.neighbors.lists
     rows._make_room(np.full(rows.rows, 2000))
     rows.mark_all()
+    long = rows.generation
     roomy.run(15)
-    assert rows.generation == 2
+    assert rows.generation == long
     np.testing.assert_array_equal(sim.position, roomy.position)
 
 

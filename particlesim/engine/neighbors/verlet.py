@@ -31,7 +31,7 @@ SKIN, SKIN_OF_CONTACTS = 0.12, 0.4
 DIRECT = 8192  # largest world that CUDA looks through directly; measured
 
 
-FEW = 64  # partners that there is room for before any have been looked for
+FEW = 32  # partners that there is room for before any have been looked for
 
 
 class VerletList(AllPairs):
