@@ -14,14 +14,6 @@ BLOCK = 256  # rows that a thread of the CPU takes at once
 @functools.cache
 def copy_kernel(dtype: Any, block: int = 1) -> wp.Kernel:
     """Kernel: target = source, row by row, or ``block`` rows by a thread."""
-    if block == 1:
-
-        @register
-        def copy_rows(first: int, source: wp.array(dtype=dtype), target_out: wp.array(dtype=dtype)):
-            i = first + wp.tid()
-            target_out[i] = source[i]
-
-        return copy_rows
 
     def copy_natively(
         first: int, last: int, source: wp.array(dtype=dtype), target: wp.array(dtype=dtype)
@@ -30,10 +22,13 @@ def copy_kernel(dtype: Any, block: int = 1) -> wp.Kernel:
     there, here = _bytes("target", dtype), _bytes("source", dtype)
     copy = native(copy_natively, f"__builtin_memcpy({there}, {here}, {_size(dtype)});", False)
 
-    @functools.partial(register, cpu_only=True)
+    @functools.partial(register, cpu_only=block > 1)
     def copy_rows(first: int, source: wp.array(dtype=dtype), target_out: wp.array(dtype=dtype)):
         i = (first + wp.tid()) * wp.static(block)
-        copy(i, wp.min(i + wp.static(block), source.shape[0]), source, target_out)
+        if wp.static(block > 1):
+            copy(i, wp.min(i + wp.static(block), source.shape[0]), source, target_out)
+        else:
+            target_out[i] = source[i]
 
     return copy_rows
 
@@ -41,24 +36,19 @@ def copy_kernel(dtype: Any, block: int = 1) -> wp.Kernel:
 @functools.cache
 def zero_kernel(dtype: Any, block: int = 1) -> wp.Kernel:
     """Kernel: target = 0, row by row, or ``block`` rows by a thread."""
-    if block == 1:
-
-        @register
-        def zero_rows(first: int, target_out: wp.array(dtype=dtype)):
-            target_out[first + wp.tid()] = dtype()
-
-        return zero_rows
 
     def zero_natively(first: int, last: int, target: wp.array(dtype=dtype)): ...
 
-    zero = native(
-        zero_natively, f"__builtin_memset({_bytes('target', dtype)}, 0, {_size(dtype)});", False
-    )
+    snippet = f"__builtin_memset({_bytes('target', dtype)}, 0, {_size(dtype)});"
+    zero = native(zero_natively, snippet, False)
 
-    @functools.partial(register, cpu_only=True)
+    @functools.partial(register, cpu_only=block > 1)
     def zero_rows(first: int, target_out: wp.array(dtype=dtype)):
         i = (first + wp.tid()) * wp.static(block)
-        zero(i, wp.min(i + wp.static(block), target_out.shape[0]), target_out)
+        if wp.static(block > 1):
+            zero(i, wp.min(i + wp.static(block), target_out.shape[0]), target_out)
+        else:
+            target_out[i] = dtype()
 
     return zero_rows
 

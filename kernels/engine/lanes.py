@@ -32,6 +32,10 @@ def row_moves(precision: Precision, *, spare: bool = False) -> str:
         for k in range(4)
     ]
 
+    loaded = "return __builtin_masked_load(three, x + 3 * (long long)i);"
+    if spare:
+        loaded = "Quad v; __builtin_memcpy(&v, x + 3 * (long long)i, sizeof(v)); return v;"
+
     def mixed(a: str, b: str, *places: int) -> str:
         """Of every four lanes those at ``places``: 0 to 3 of a, 4 to 7 of b."""
         lane = [n if n < 4 else lanes + n - 4 for n in places]
@@ -44,11 +48,7 @@ def row_moves(precision: Precision, *, spare: bool = False) -> str:
     typedef bool Three __attribute__((ext_vector_type(4)));
     const Three three = {{1, 1, 1, 0}};
     auto load = [=](const {real}* x, int i) -> Quad {{
-        {
-        "Quad v; __builtin_memcpy(&v, x + 3 * (long long)i, sizeof(v)); return v"
-        if spare
-        else "return __builtin_masked_load(three, x + 3 * (long long)i)"
-    };
+        {loaded}
     }};
     auto store = [=]({real}* x, int i, Quad v) {{
         __builtin_masked_store(three, v, x + 3 * (long long)i);

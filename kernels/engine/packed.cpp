@@ -12,8 +12,8 @@ const int mine = LISTED ? 0 : a - base;  // where the own slots are among the pa
 const int all = LISTED ? count[c] : end[w] - base;
 const int partners = p.cutoff_squared > 0 ? all : 0;
 const int* listed = index + (LISTED ? row[c] : 0);
-if (LISTED)
-    for (int k = 0; k < all; k += 16) __builtin_prefetch(index + row[c + 2] + k);
+if (LISTED)  // rows follow each other: mostly the one after the next
+    for (int k = 2 * all; k < 3 * all; k += 16) __builtin_prefetch(listed + k);
 for (int u = 0; u < own; ++u) { TOUCH(order[a + u]) }
 
 typedef real V4 __attribute__((vector_size(4 * sizeof(real))));
@@ -44,33 +44,12 @@ auto image = [&](real d, int n) __attribute__((always_inline)) -> real {
 // can see is within half a box of it; and where that is within the box, there are none.
 const int periodic = PERIODIC[0] | PERIODIC[1] | PERIODIC[2];
 bool near = LISTED | !periodic, inner = near & PLACED;
+for (int u = 0; u < OFF; ++u) slots[u] = a + (u < own ? u : own - 1);
 auto place_own = [&]() __attribute__((always_inline)) {
-    if (own == SIZE)  // their rows follow each other
-#pragma clang loop unroll(full)
-        for (int u = 0; u < SIZE; u += 4) {
-            V4 A, B, C;
-            __builtin_memcpy(&A, x + 3 * (a + u), sizeof(V4));
-            __builtin_memcpy(&B, x + 3 * (a + u) + 4, sizeof(V4));
-            __builtin_memcpy(&C, x + 3 * (a + u) + 8, sizeof(V4));
-            const V4 s = __builtin_shufflevector(A, B, 0, 3, 6, 6);
-            const V4 t = __builtin_shufflevector(A, B, 1, 4, 7, 7);
-            const V4 v = __builtin_shufflevector(A, B, 2, 5, 5, 5);
-            const V4 X = __builtin_shufflevector(s, C, 0, 1, 2, 5);
-            const V4 Y = __builtin_shufflevector(t, C, 0, 1, 2, 6);
-            const V4 Z = __builtin_shufflevector(v, C, 0, 1, 4, 7);
-            __builtin_memcpy(b[0] + u, &X, sizeof(V4));
-            __builtin_memcpy(b[1] + u, &Y, sizeof(V4));
-            __builtin_memcpy(b[2] + u, &Z, sizeof(V4));
-        }
-    else
-        for (int u = 0; u < SIZE; ++u)
-            for (int n = 0; n < 3; ++n) b[n][u] = x[3 * (a + (u < own ? u : own - 1)) + n];
+    for (int u = 0; u < SIZE; u += W) fetch(x, slots + u, 1, b[0] + u, OFF + TILE);
 };
 place_own();
-for (int u = 0; u < SIZE; ++u) {
-    slots[u] = a + (u < own ? u : own - 1);
-    COPY(u, slots[u])
-}
+for (int u = 0; u < SIZE; ++u) { COPY(u, slots[u]) }
 if (LISTED & periodic) {
     const real reach = __builtin_elementwise_sqrt(p.cutoff_squared);
     auto wide = V4{} != V4{}, out = wide;
@@ -207,10 +186,7 @@ for (int tile = 0; tile < partners; tile += TILE) {
         for (int u = 0; u < own; ++u)
             for (int k = 0; k < m; ++k) {
                 real d[3];
-                for (int n = 0; n < 3; ++n) {
-                    d[n] = b[n][u] - b[n][OFF + k];
-                    d[n] = image(d[n], n);
-                }
+                for (int n = 0; n < 3; ++n) d[n] = image(b[n][u] - b[n][OFF + k], n);
                 const real r2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
                 if (r2 <= CLOSEST && r2 < p.cutoff_squared && k + tile != mine + u)
                     push[u] += GIVE(u, OFF + k, d[0], d[1], d[2], r2)[1];

@@ -63,7 +63,8 @@ def largest(
     q, found = start / size_of(start), Largest(0.0, 0.0, np.zeros(count), 0)
     for k in range(steps):
         basis[k], images[k] = apply(q)
-        found = _ritz(basis[: k + 1], images[: k + 1])
+        gram = _products(basis[: k + 1], basis[: k + 1])
+        found = _ritz(basis[: k + 1], images[: k + 1], gram)
         scale = size_of(images[k])
         if not np.isfinite(scale) or found.residual <= tolerance * found.size:
             break
@@ -72,7 +73,7 @@ def largest(
             return replace(found, residual=most - found.size)
         q = images[k] / scale if scale > 0.0 else images[k]
         for _ in range(2):  # once leaves what rounding makes of nearly parallel vectors
-            along = _solve(basis[: k + 1], _products(basis[: k + 1], q[None])[:, 0])
+            along = _solve(gram, _products(basis[: k + 1], q[None])[:, 0])
             q = q - _sum(along, basis[: k + 1])
         size = size_of(q)
         if size <= 0.1 * tolerance:
@@ -98,20 +99,20 @@ def size_of(v: np.ndarray) -> float:
     return math.sqrt(float(np.sum(v.real**2 + v.imag**2)))
 
 
-def _solve(basis: np.ndarray, right: np.ndarray) -> np.ndarray:
+def _solve(gram: np.ndarray, right: np.ndarray) -> np.ndarray:
     """What times Q^T Q is ``right``, of least size where directions are missing."""
-    values, vectors = np.linalg.eigh(_products(basis, basis))
+    values, vectors = np.linalg.eigh(gram)
     kept = values > len(values) * np.finfo(float).eps * values[-1]
     along = vectors[:, kept]
     return (along / values[kept]) @ (along.T @ right)
 
 
-def _ritz(basis: np.ndarray, images: np.ndarray) -> Largest:
-    """The largest Ritz value of a basis (k, n) and its images (k, n)."""
+def _ritz(basis: np.ndarray, images: np.ndarray, gram: np.ndarray) -> Largest:
+    """The largest Ritz value of a basis (k, n), its images (k, n), and its products (k, k)."""
     count = basis.shape[1]
     if not np.isfinite(images).all():
         return Largest(np.inf, 0.0, np.ones(count), len(basis))
-    values, vectors = np.linalg.eig(_solve(basis, _products(basis, images)))
+    values, vectors = np.linalg.eig(_solve(gram, _products(basis, images)))
     top = int(np.argmax(np.abs(values)))
     z = _sum(vectors[:, top], basis)
     norm = size_of(z)

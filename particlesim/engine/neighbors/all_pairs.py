@@ -40,10 +40,8 @@ class AllPairs:
         self.pairs.begin = model.array(self.begin_host, wp.int32)
         self.pairs.end = model.array(self.end_host, wp.int32)
         self.slots = model.array(np.arange(self.count), wp.int32)
-        self.rows, self.block = (
-            0,
-            1,
-        )  # clusters of a pass over it, and at most so many slots in each
+        self.rows = 0  # clusters of a pass over it
+        self.block = 1  # at most so many slots in each
         self.users: list[str] = []
         # By world: whether it renews the list before interactions, and before constraints.
         self.for_interactions, self.for_constraints = np.zeros((2, model.world_count), dtype=bool)

@@ -127,7 +127,7 @@ class ClusterRows:
         self.pools = np.maximum(self.pools, wanted)
         self.made += 1
         first = np.concatenate([[0], np.cumsum(self.pools)])
-        listed.pairs.row = wp.zeros(len(found) + 2, dtype=wp.int64, device=model.device)
+        listed.pairs.row = wp.zeros(len(found), dtype=wp.int64, device=model.device)
         listed.pairs.entry_stride = 1
         self.rows = Pool()
         self.rows.first = model.array(first, wp.int64)
