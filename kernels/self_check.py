@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from .engine.clusters import halving_kernels, supers_type
-from .engine.columns import SUPER, columns_type
 from .engine.loops import ROWS, Pairs, Periodicity, Term, box_type
-from .engine.neighbors import blocks_type
+from .engine.neighbors.clusters import halving_kernels, supers_type
+from .engine.neighbors.columns import SUPER, columns_type
+from .engine.neighbors.partners import Pool, partners_kernel
+from .engine.neighbors.renewal import blocks_type
 from .engine.packed import AHEAD, CLUSTER
-from .engine.partners import Pool, partners_kernel
 from .interactions.pair import pair_kernel
 from .precision import FLOAT64, function, structure, translate
 from .warp_internals import WRITTEN_FOR, Packed

@@ -4,7 +4,7 @@ The partners of a cluster are copied once into local planes, in the periodic ima
 to the cluster, and so is what a term reads of them. A loop of fixed length then serves four slots
 at once from contiguous memory: nothing is gathered in it, every sum stays in registers, and a
 cluster writes only its own rows, so that bits do not depend on threads. The lists that it goes over
-are made in :mod:`particlesim.kernels.engine.partners`.
+are made in :mod:`particlesim.kernels.engine.neighbors.partners`.
 
 Pall and Hess (2013) share partners in the same way, but in clusters on both sides; at the width of
 today's vector units most pairs of such clusters are beyond the cutoff.

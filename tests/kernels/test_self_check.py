@@ -11,7 +11,8 @@ import particlesim as ps
 from particlesim.engine.execution.threads import Team
 from particlesim.engine.model import Model
 from particlesim.kernels import native, self_check
-from particlesim.kernels.engine import packed, partners
+from particlesim.kernels.engine import packed
+from particlesim.kernels.engine.neighbors import partners
 from particlesim.kernels.interactions import pair
 from particlesim.kernels.warp_internals import Packed, elements
 

@@ -12,7 +12,7 @@ import warp as wp
 import particlesim
 from particlesim.kernels import warp_internals as internals
 from particlesim.kernels.engine.loops import Periodicity
-from particlesim.kernels.engine.rows import row_functions
+from particlesim.kernels.engine.neighbors.rows import row_functions
 from particlesim.kernels.precision import (
     FLOAT32,
     FLOAT64,
@@ -160,7 +160,7 @@ def test_a_digest_tells_apart_what_differs():
 def test_names_are_the_same_in_every_process():
     code = (
         "import warp as wp; wp.config.log_level = wp.LOG_WARNING\n"
-        "from particlesim.kernels.engine.rows import row_functions\n"
+        "from particlesim.kernels.engine.neighbors.rows import row_functions\n"
         "from particlesim.kernels.precision import FLOAT64\n"
         "from particlesim.kernels.engine.loops import Periodicity\n"
         "from particlesim.kernels.warp_internals import native_name\n"

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ...kernels.engine import neighbors as kernels
 from ...kernels.engine.loops import ALL, Pairs
+from ...kernels.engine.neighbors import renewal as kernels
 from ...kernels.engine.packed import CROWD
 from ..execution.launch import launch
 from ..model import Model

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ...kernels.engine.rows import blocks_type
+from ...kernels.engine.neighbors.rows import blocks_type
 from ..model import Model
 
 LESS = 4.0  # times fewer candidates, from which blocks by size pay

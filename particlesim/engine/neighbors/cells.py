@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ...kernels.engine import neighbors as kernels
+from ...kernels.engine.neighbors import renewal as kernels
 from ..model import Model
 from .blocks import Block
 

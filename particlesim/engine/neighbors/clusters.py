@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ...kernels.engine.clusters import halving_kernels, supers_type
-from ...kernels.engine.columns import (
+from ...kernels.engine.neighbors.clusters import halving_kernels, supers_type
+from ...kernels.engine.neighbors.columns import (
     LINE,
     SUPER,
     columns_type,
@@ -17,8 +17,15 @@ from ...kernels.engine.columns import (
     number_kernel,
     sort_kernel,
 )  # fmt: skip
+from ...kernels.engine.neighbors.partners import (
+    HERE,
+    LEAST,
+    ROUNDED,
+    Pool,
+    partners_kernel,
+    pools_kernel,
+)
 from ...kernels.engine.packed import AHEAD, CLUSTER
-from ...kernels.engine.partners import HERE, LEAST, ROUNDED, Pool, partners_kernel, pools_kernel
 from ..execution.launch import call, launch, when
 from ..model import Model
 from .blocks import Block

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ...kernels.engine import neighbors as kernels
-from ...kernels.engine import rows
+from ...kernels.engine.neighbors import renewal as kernels
+from ...kernels.engine.neighbors import rows
 from ...kernels.warp_internals import grid_shape
 from ..execution.launch import call, launch, when
 from ..model import Model

@@ -14,9 +14,9 @@ import numpy as np
 import warp as wp
 
 from ... import validate
-from ...kernels.engine import neighbors as kernels
-from ...kernels.engine.clusters import SMALL
 from ...kernels.engine.loops import ROWS
+from ...kernels.engine.neighbors import renewal as kernels
+from ...kernels.engine.neighbors.clusters import SMALL
 from ..execution.launch import call, launch, when
 from ..model import Model
 from ..state import State

@@ -10,7 +10,7 @@ import warp as wp
 from ... import validate
 from ...engine.execution.launch import launch
 from ...engine.neighbors.cells import grid_over
-from ...kernels.engine.neighbors import cell_coordinates_kernel
+from ...kernels.engine.neighbors.renewal import cell_coordinates_kernel
 from ...kernels.interactions import sph as kernels
 from .sph import SPH
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import warp as wp
 
-from ..precision import Precision, function, register, structure
-from .loops import box_type
+from ...precision import Precision, function, register, structure
+from ..loops import box_type
 
 SUPER = 16  # slots that are halved together, and that a cell holds
 BINS = 8  # of a column, on the length of its side

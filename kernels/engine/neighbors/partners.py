@@ -4,14 +4,14 @@ import functools
 
 import warp as wp
 
-from ..native import body
-from ..precision import Precision, native, register
-from ..warp_internals import columns
+from ...native import body
+from ...precision import Precision, native, register
+from ...warp_internals import columns
+from ..loops import Pairs, Periodicity, box_type
+from ..packed import CLUSTER
 from .clusters import supers_type
 from .columns import SUPER, columns_type
-from .loops import Pairs, Periodicity, box_type
-from .neighbors import blocks_type
-from .packed import CLUSTER
+from .renewal import blocks_type
 
 RUNS = 256  # of slots that one super looks at; if there are more it looks at all
 LEAST = 8  # entries that are written at once
@@ -62,7 +62,7 @@ def _look(precision: Precision, periodic: Periodicity) -> wp.Function:
     }  # fmt: skip
     lanes = ", ".join(f"{_lanes(mask):#x}ull" for mask in range(256))
     table = f"static const unsigned long long LANES[256] = {{{lanes}}};\n"
-    snippet = table + body("engine/partners.cpp", precision, numbers, arrays, macros)
+    snippet = table + body("engine/neighbors/partners.cpp", precision, numbers, arrays, macros)
 
     def look(
         q: int, w: int, box: Box, blocks: Blocks, columns: wp.array(dtype=Columns),

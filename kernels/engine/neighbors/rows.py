@@ -1,16 +1,16 @@
 """Rows of Verlet lists for CUDA: to each slot the slots within reach, by a hash grid or directly.
 
 Every slot is a cluster of its own. What a row has no room for is counted and left out. On a CPU
-clusters of slots share their rows (:mod:`particlesim.kernels.engine.clusters`).
+clusters of slots share their rows (:mod:`particlesim.kernels.engine.neighbors.clusters`).
 """
 
 import functools
 
 import warp as wp
 
-from ..precision import Precision, function, register
-from .loops import Pairs, Periodicity, box_type, minimum_image
-from .neighbors import blocks_type, cells_type
+from ...precision import Precision, function, register
+from ..loops import Pairs, Periodicity, box_type, minimum_image
+from .renewal import blocks_type, cells_type
 
 
 @functools.cache

@@ -1,9 +1,9 @@
 """Clusters of slots on a CPU: four particles that are near each other, and their partners.
 
-A block of slots, in the order of :mod:`columns <particlesim.kernels.engine.columns>`, is cut into
-*supers* of sixteen, and each of these is halved along its longest side, twice, which makes four
-clusters of four. Worlds too small for columns are halved all the way. The four of a super look for
-partners together: in the supers near it, sixteen slots at a time.
+A block of slots, in the order of :mod:`.columns`, is cut into *supers* of sixteen, and each of
+these is halved along its longest side, twice, which makes four clusters of four. Worlds too small
+for columns are halved all the way. The four of a super look for partners together: in the supers
+near it, sixteen slots at a time.
 """
 
 import functools
@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ..native import body
-from ..precision import Precision, native, register, structure
-from ..warp_internals import columns
+from ...native import body
+from ...precision import Precision, native, register, structure
+from ...warp_internals import columns
+from ..loops import Periodicity, box_type, minimum_image
+from ..packed import CLUSTER
 from .columns import SUPER, columns_type
-from .loops import Periodicity, box_type, minimum_image
-from .packed import CLUSTER
 
 SMALL = 512  # largest world that is halved all the way; measured
 
@@ -43,7 +43,7 @@ def _halved(precision: Precision, periodic: Periodicity) -> wp.Function:
         "MOST": SMALL, "SUPER": SUPER, "CLUSTER": CLUSTER, "PERIODIC": [int(on) for on in periodic],
     }  # fmt: skip
     arrays, macros = {"x": "x_io", "int* order": "order_io"}, {"stride": columns("x_io")}
-    snippet = body("engine/halve.cpp", precision, numbers, arrays, macros)
+    snippet = body("engine/neighbors/halve.cpp", precision, numbers, arrays, macros)
 
     def halve(
         first: int, n: int, box: Box, order_io: wp.array(dtype=wp.int32),

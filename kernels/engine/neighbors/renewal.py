@@ -4,7 +4,7 @@ The grid is built in cell coordinates u = turn (x - origin), in which every cell
 ``turn`` scales, and takes the axes in the order that has the grid's order follow the particles'
 own. On a periodic axis it scales by cells / length, so that the grid's wrap by modulo is exactly
 the periodicity of the box, whatever its shape. Slots (the loop's order) follow the grid's order.
-The rows themselves are made in :mod:`particlesim.kernels.engine.rows`.
+The rows themselves are made in :mod:`particlesim.kernels.engine.neighbors.rows`.
 """
 
 import functools
@@ -13,9 +13,9 @@ from typing import Any
 
 import warp as wp
 
-from ..precision import Precision, native, register, structure
-from ..warp_internals import elements
-from .loops import Periodicity, box_type, minimum_image
+from ...precision import Precision, native, register, structure
+from ...warp_internals import elements
+from ..loops import Periodicity, box_type, minimum_image
 
 
 def cells_type(precision: Precision) -> Any:
