@@ -39,7 +39,8 @@ class Snapshot:
             name: array for name, array in state.arrays.items() if name not in skip
         }
         for k, each in enumerate(loop.neighbors.verlet):
-            self.arrays[f"neighbors_{k}"] = each.x_listed
+            for name, array in each.persistent().items():
+                self.arrays[f"neighbors_{k}_{name}"] = array
         self._owners: dict[str, Part | Observer] = {
             **{f"interaction_{k}": part for k, part in enumerate(loop.interactions)},
             **{f"constraint_{k}": part for k, part in enumerate(loop.constraints)},
@@ -99,8 +100,8 @@ class Snapshot:
         for owner, part in self._owners.items():
             if rest.startswith(f"{owner}_"):
                 return part.worlds(rest.removeprefix(f"{owner}_"), array)
-        index = int(rest.removeprefix("neighbors_"))
-        return model.world_of[self.loop.neighbors.verlet[index].members_host]
+        index, _, name = rest.removeprefix("neighbors_").partition("_")
+        return self.loop.neighbors.verlet[int(index)].worlds(name)
 
     def rows(self, worlds: Iterable[int]) -> Rows:
         """What is now in the rows of these worlds, on the host."""

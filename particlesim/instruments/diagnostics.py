@@ -142,15 +142,19 @@ def undisturbed(sim: Source) -> Iterator[None]:
     """
     state = sim.state
     kept = {name: wp.clone(state[name]) for name in ("density", "pressure") if name in state}
-    rows = [(each, wp.clone(each.x_listed)) for each in sim.neighbors.verlet]
+    rows = [
+        (each, [(array, wp.clone(array)) for array in each.persistent().values()])
+        for each in sim.neighbors.verlet
+    ]
     try:
         yield
     finally:
         for name, array in kept.items():
             wp.copy(state[name], array)
-        for each, listed in rows:
-            if not np.array_equal(each.x_listed.numpy(), listed.numpy()):
-                wp.copy(each.x_listed, listed)
+        for each, arrays in rows:
+            if any(not np.array_equal(now.numpy(), then.numpy()) for now, then in arrays):
+                for now, then in arrays:
+                    wp.copy(now, then)
                 each.mark_all()
                 each.rebuild()
 

@@ -34,8 +34,9 @@ class Settings:
             :class:`particlesim.Integrator`.
         precision: ``"float32"`` or ``"float64"``, in every kernel.
         skin: Added to the cutoff of neighbour lists [length]; they are rebuilt when a particle has
-            moved half of it. Changes the cost, not the forces. None: 0.12 of the cutoff, 0.2 of
-            that of contacts.
+            moved half of it. Changes the cost, not the forces. None: as thick as pays in each
+            world, by how long its lists have lasted; on CUDA 0.12 of the cutoff, 0.4 of that of
+            contacts.
         compensated: Carry the rounding error of positions and velocities along (Kahan 1965), so
             that neither freezes where an increment is below the last bit.
         relaxation: Factor on averaged (Jacobi) contact corrections, above 0, at most 1: more would

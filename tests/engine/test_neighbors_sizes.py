@@ -49,7 +49,9 @@ def test_all_pairs_that_touch_are_found(count, box, skin, loops):
     sim = simulate(mixture(count, box, points=40), "cpu", skin=skin)
     listed, rows = rows_of(sim)
     assert len(listed.blocks) > 2
-    assert listed.skin[0] == skin or (skin is None and 0 < listed.skin[0] < 0.05)
+    assert listed.skin.thickness[0] == skin or (
+        skin is None and 0 < listed.skin.thickness[0] < 0.05
+    )
     x, radius = sim.position, sim.get("radius")
     d = x[:, None] - x[None]
     if box is not None:
@@ -61,7 +63,10 @@ def test_all_pairs_that_touch_are_found(count, box, skin, loops):
         assert len(set(row)) == len(row)  # nobody twice
         assert set(np.nonzero(r[i] < reach[i])[0]) <= set(row)
         # Nor farther than a pair twice as large, a size's range, would look, and the skin.
-        limit = 2 * np.maximum(reach[i, row], listed.reach.max() / 2**blocks.MOST) + listed.skin[0]
+        limit = (
+            2 * np.maximum(reach[i, row], listed.reach.max() / 2**blocks.MOST)
+            + listed.skin.thickness[0]
+        )
         assert (r[i, row] <= limit).all()
 
 

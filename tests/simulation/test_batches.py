@@ -19,7 +19,7 @@ def test_rows_grow_for_one_world_only_in_cost(device):
         return scene
 
     # Random points overlap, and some pairs part at nonsensical speeds: not the subject here.
-    settings = ps.Settings(dt=0.02, substeps=2, watchdog=False)
+    settings = ps.Settings(dt=0.02, substeps=2, skin=0.24, watchdog=False)
     batch = ps.Simulation([build(0.01), build(1.5)], settings, device=device)
     before = batch.neighbors.lists[0].capacity
     batch.run(20)

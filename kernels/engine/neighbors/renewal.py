@@ -36,7 +36,8 @@ def blocks_type(precision: Precision) -> Any:
             "end": wp.array(dtype=wp.int32),  # block -> last slot + 1
             "room": wp.array(dtype=wp.int32),  # block -> entries of a row, on CUDA
             "first": wp.array(dtype=wp.int32),  # world -> first block
-            "reach_squared": wp.array2d(dtype=precision.scalar),  # block, other of its world
+            "cutoff": wp.array2d(dtype=wp.float64),  # block, other of its world
+            "reach_squared": wp.array2d(dtype=precision.scalar),  # the same, with the skin
         },
     )
 

@@ -23,17 +23,17 @@ FEW = 64  # particles that may well look at each other all
 
 @dataclass(frozen=True)
 class Block:
-    """Slots of one world from ``begin`` to ``end - 1``, and how far they reach.
+    """Slots of one world from ``begin`` to ``end - 1``, and how far they look.
 
-    ``reach`` is, for each block of the world in turn, cutoff + skin of a pair with that one;
-    ``own`` that of two of this block, or enough of the largest for cells of that width.
-    ``largest`` is half the cutoff of its largest, by which it reaches.
+    ``cutoff`` is, for each block of the world in turn, that of a pair with one of it; ``own`` that
+    of two of this block, or enough of the largest for cells of that width. ``largest`` is half the
+    cutoff of its largest.
     """
 
     world: int
     begin: int
     end: int
-    reach: np.ndarray
+    cutoff: np.ndarray
     own: float
     largest: float
 
@@ -71,55 +71,48 @@ def by_size(half: np.ndarray) -> bool:
 
 
 def blocks(
-    begin: np.ndarray,
-    end: np.ndarray,
-    cutoff: np.ndarray,
-    skin: np.ndarray,
-    half: list[np.ndarray | None],
-    *,
-    given: bool,
+    begin: np.ndarray, end: np.ndarray, cutoff: np.ndarray, half: list[np.ndarray | None]
 ) -> Iterator[tuple[np.ndarray, list[Block], float]]:
-    """World by world: its members in the order of their slots, its blocks, and its skin.
+    """World by world: its members in the order of their slots, its blocks, and most's own cutoff.
 
     Args:
         begin: First slot of each world, (worlds,). end: Its last slot + 1.
         cutoff: Of each world, 0 where nothing is looked for.
-        skin: Of each world, if it is one block.
         half: Of each world in blocks by size half the cutoff of its members, else None.
-        given: The skin is as somebody has set it, and not in proportion to the cutoff.
     """
     for w, (a, b) in enumerate(zip(begin, end, strict=True)):
         sizes = half[w]
         if sizes is None:
-            reach = float(cutoff[w] + skin[w]) if cutoff[w] > 0 else np.inf
-            whole = Block(w, int(a), int(b), np.array([reach]), reach, float(cutoff[w] / 2))
-            yield np.arange(a, b), [whole], float(skin[w])
+            looked = float(cutoff[w]) if cutoff[w] > 0 else np.inf
+            whole = Block(w, int(a), int(b), np.array([looked]), looked, float(cutoff[w] / 2))
+            yield np.arange(a, b), [whole], float(cutoff[w])
             continue
         octave = _octaves(sizes)
         _, count, largest = _largest(sizes, octave)
-        # Those that are most are renewed most: the skin is in proportion to theirs.
-        thin = float(skin[w] * (1.0 if given else largest[count.argmax()] / largest.max()))
         edges = a + np.concatenate([[0], np.cumsum(count)])
-        reach = largest[:, None] + largest + thin
-        own = np.maximum(reach.diagonal(), reach.max() / 2**MOST)
+        pairs = largest[:, None] + largest
+        own = np.maximum(pairs.diagonal(), pairs.max() / 2**MOST)
         cut = [
-            Block(w, int(edges[k]), int(edges[k + 1]), reach[k], float(own[k]), float(largest[k]))
+            Block(w, int(edges[k]), int(edges[k + 1]), pairs[k], float(own[k]), float(largest[k]))
             for k in range(len(count))
         ]
-        yield a + np.argsort(octave, kind="stable"), cut, thin
+        # Those that are most are renewed most.
+        most = float(cutoff[w] * largest[count.argmax()] / largest.max())
+        yield a + np.argsort(octave, kind="stable"), cut, most
 
 
 def blocks_struct(model: Model, of_worlds: Sequence[Sequence[Block]]) -> Any:
     """The blocks of all worlds as kernels take them; the room in their rows is still to be set."""
     every = [block for each in of_worlds for block in each]
     counts = [block.count for block in every]
-    reach = np.zeros((len(every), max(map(len, of_worlds))))
+    cutoff = np.zeros((len(every), max(map(len, of_worlds))))
     for k, block in enumerate(every):
-        reach[k, : len(block.reach)] = block.reach
+        cutoff[k, : len(block.cutoff)] = block.cutoff
     struct = blocks_type(model.precision)()
     struct.of = model.array(np.repeat(np.arange(len(every)), counts), wp.int32)
     struct.begin = model.array([block.begin for block in every], wp.int32)
     struct.end = model.array([block.end for block in every], wp.int32)
     struct.first = model.array(np.cumsum([0, *map(len, of_worlds)]), wp.int32)
-    struct.reach_squared = model.array(reach**2, model.precision.scalar)
+    struct.cutoff = model.array(cutoff, wp.float64)
+    struct.reach_squared = model.array(cutoff**2, model.precision.scalar)
     return struct

@@ -15,9 +15,9 @@ CELLS_PER_PARTICLE = 4  # bounds the cost of clearing a grid
 MAX_CELLS = 256  # along an axis
 
 
-def grid_over(model: Model, block: Block, x: np.ndarray) -> tuple[wp.HashGrid, Any]:
-    """A hash grid sized to a block's positions, and its cell coordinates."""
-    w, reach = block.world, max(block.own, float(np.finfo(model.precision.numpy).tiny))
+def grid_over(model: Model, block: Block, reach: float, x: np.ndarray) -> tuple[wp.HashGrid, Any]:
+    """A hash grid of so wide cells sized to a block's positions, and its cell coordinates."""
+    w, reach = block.world, max(reach, float(np.finfo(model.precision.numpy).tiny))
     lower, upper = x.min(axis=0), x.max(axis=0)
     # A little more than the reach, for the rounding of cell coordinates in float32.
     cells = np.clip(np.floor((upper - lower) / (1.001 * reach)) + 1, 1, MAX_CELLS)

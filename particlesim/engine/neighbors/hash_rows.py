@@ -44,7 +44,8 @@ class HashRows:
         start = listed.x_listed.numpy().astype(np.float64)
         for k in np.nonzero(used & (sizes > 0))[0].tolist():
             block = listed.blocks[k]
-            self.grids[k] = grid_over(model, block, start[block.begin : block.end])
+            own = block.own + listed.skin.first[block.world]
+            self.grids[k] = grid_over(model, block, own, start[block.begin : block.end])
 
     @staticmethod
     def clusters(model: Model, blocks: list[Block]) -> np.ndarray:
@@ -110,13 +111,14 @@ class HashRows:
         make = rows.grid_rows_kernel(model.precision, model.periodic)
         for block, _, _ in mine:
             for k, (other, grid, place) in enumerate(mine):
-                reach = block.reach[k]
+                thick = listed.skin.first[w]
+                reach = block.cutoff[k] + thick
                 launch(
                     make,
                     block.count,
-                    [grid.id, place, block.begin, reach / other.own, int(k > 0), model.box,
-                     reach**2, listed.struct, self.slot, self.planes, listed.pairs, listed.found,
-                     listed.overflow],
+                    [grid.id, place, block.begin, reach / (other.own + thick), int(k > 0),
+                     model.box, reach**2, listed.struct, self.slot, self.planes, listed.pairs,
+                     listed.found, listed.overflow],
                     device,
                 )  # fmt: skip
 

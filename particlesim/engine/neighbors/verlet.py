@@ -2,8 +2,9 @@
 
 A list holds for every cluster of slots the slots nearer than cutoff + skin, and stays valid until a
 particle has moved half the skin; then the lists of that particle's world are rebuilt, and of no
-other, so that a world in a batch goes exactly as it goes alone. Worlds are kept apart by
-construction: a large world has hash grids of its own, one for each of its blocks.
+other, so that a world in a batch goes exactly as it goes alone. How thick a skin pays is chosen
+in :mod:`.skin`. Worlds are kept apart by construction: a large world has hash grids of its own, one
+for each of its blocks.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from ... import validate
 from ...kernels.engine.loops import ROWS
 from ...kernels.engine.neighbors import renewal as kernels
 from ...kernels.engine.neighbors.clusters import SMALL
+from ...kernels.engine.neighbors.skin import reach_kernel
 from ..execution.launch import call, launch, when
 from ..model import Model
 from ..state import State
@@ -24,10 +26,8 @@ from .all_pairs import AllPairs
 from .blocks import blocks, blocks_struct
 from .clusters import ClusterRows
 from .hash_rows import HashRows
+from .skin import Skin
 
-# Skin over cutoff, where Settings leaves it open; measured. Grains have few partners, so that rows
-# cost little to hold and much to make.
-SKIN, SKIN_OF_CONTACTS = 0.12, 0.4
 DIRECT = 8192  # largest world that CUDA looks through directly; measured
 
 
@@ -49,14 +49,10 @@ class VerletList(AllPairs):
 
     def _cut(self) -> np.ndarray:
         """Cut the worlds into blocks; returns the members in the order of their slots."""
-        set_skin = self.model.settings.skin
-        share = np.where(self.for_interactions, SKIN, SKIN_OF_CONTACTS)
-        skin = self.cutoff * share if set_skin is None else np.full_like(self.cutoff, set_skin)
-        ranges, given = (self.begin_host, self.end_host), set_skin is not None
-        cuts = list(blocks(*ranges, self.cutoff, skin, self.half, given=given))
+        ranges = (self.begin_host, self.end_host)
+        cuts = list(blocks(*ranges, self.cutoff, self.half))
         self.blocks = [block for _, of_world, _ in cuts for block in of_world]
-        self.skin = np.array([thin for _, _, thin in cuts])
-        self.reach = np.where(self.cutoff > 0, self.cutoff + self.skin, np.inf)
+        self.skin = Skin(self.model, np.array([most for *_, most in cuts]), ~self.for_interactions)
         self.struct = blocks_struct(self.model, [of_world for _, of_world, _ in cuts])
         return self.members_host[np.concatenate([order for order, _, _ in cuts])]
 
@@ -66,12 +62,11 @@ class VerletList(AllPairs):
         self._check_box()
         members = self._cut()
         self.members = model.array(members, wp.int32)
-        # A hair less than half the skin, for the rounding of the distances compared.
-        margins = [
-            np.where(renewed, (0.4999 * self.skin) ** 2, np.inf)
-            for renewed in (self.for_interactions, self.for_constraints)
-        ]
-        self.margins_squared = [model.array(each, real) for each in margins]
+        # By phase and world, once there are rows; in a phase that does not renew them never.
+        renewed = np.array([self.for_interactions, self.for_constraints])
+        self.margins_squared = model.array(np.where(renewed, 0.0, np.inf), real)
+        if self.skin.chosen:
+            state.require({"time"})
         self.order = wp.clone(self.members)
         self.x_listed = model.array(state["position"].numpy()[members], vec3)
         self.moved = wp.zeros(model.world_count, dtype=wp.int32, device=device)
@@ -112,6 +107,21 @@ class VerletList(AllPairs):
         self.generation += 1
 
     @property
+    def reach(self) -> np.ndarray:
+        """Within what distance partners are listed, (worlds,); of pairs that reach farthest."""
+        return np.where(self.cutoff > 0, self.cutoff + self.skin.thickness, np.inf)
+
+    def persistent(self) -> dict[str, wp.array]:
+        """What rows are made from, besides what never changes."""
+        return {"x": self.x_listed, **self.skin.persistent()}
+
+    def worlds(self, name: str) -> np.ndarray:
+        """The world of each row of one of these."""
+        if name == "x":
+            return self.model.world_of[self.members_host]
+        return np.arange(self.model.world_count)
+
+    @property
     def work(self) -> float:
         """Pairs that are listed at present."""
         return float(self.pairs.count.numpy() @ self.of_cluster)
@@ -145,23 +155,26 @@ class VerletList(AllPairs):
         launch(
             flag,
             self.count,
-            [self.members, self.world, model.box, self.margins_squared[for_constraint],
+            [self.members, self.world, model.box, self.margins_squared[int(for_constraint)],
              state.position, self.x_listed, self.moved, self.any_moved],
             device,
             block,
         )  # fmt: skip
+        self.skin.flag(state, self.moved, self.any_moved)
         with when(self.any_moved):
             self._take(state)
         self.gather(state, self.names)
 
     def renew(self, state: State, worlds: list[int]) -> None:
         """Make the rows of these worlds from the present positions, now and outside a frame."""
+        self.skin.begin_anew(worlds)
         self.mark(worlds)
         self._take(state)
         self.grow()
 
     def _take(self, state: State) -> None:
         """Rows of the worlds marked as moved, from the present positions."""
+        self.skin.choose(state, self.moved)
         launch(
             kernels.build_kernels(self.model.precision).take_positions,
             self.count,
@@ -172,6 +185,9 @@ class VerletList(AllPairs):
 
     def rebuild(self) -> None:
         """Make the rows of the worlds marked as moved from ``x_listed``, and unmark them."""
+        inputs = [self.moved, self.skin.struct, self.struct, self.margins_squared]
+        reach = reach_kernel(self.model.precision)
+        launch(reach, self.model.world_count, inputs, self.model.device)
         self.layout.rebuild()
         call(self.moved.zero_)
         call(self.any_moved.zero_)
@@ -203,9 +219,10 @@ class VerletList(AllPairs):
 
     def describe(self) -> str:
         mean = self.work / max(1, self.count)
+        thick = self.skin.thickness
         looking = [block for block in self.blocks if self.cutoff[block.world] > 0]
-        least = min((block.reach.min() for block in looking), default=0.0)
-        most = max((block.reach.max() for block in looking), default=0.0)
+        least = min((each.cutoff.min() + thick[each.world] for each in looking), default=0.0)
+        most = max((each.cutoff.max() + thick[each.world] for each in looking), default=0.0)
         reach = f"{most:g}" if least == most else f"{least:g} to {most:g}"
         return (
             f"within {reach} of {self.count} particles, {mean:.0f} listed on average, room for "
@@ -237,5 +254,5 @@ class VerletList(AllPairs):
         length = self.model.box_length[world]
         d -= np.where(length > 0, length * np.round(d / np.where(length > 0, length, 1.0)), 0.0)
         first = self.struct.first.numpy()[world]
-        reach = self.blocks[of[slot]].reach[of[others] - first]
+        reach = self.blocks[of[slot]].cutoff[of[others] - first] + self.skin.thickness[world]
         return (others != slot) & ((d**2).sum(axis=1) < reach**2)

@@ -91,7 +91,8 @@ class Limits:
         """Coordinates up to which positions serve the scene, (worlds,)."""
         radius = self.model.column("radius")
         smallest = self._by_world(np.fmin, np.where(radius > 0, radius, np.nan))
-        lengths = [0.5 * np.where(each.cutoff > 0, each.skin, np.inf) for each in neighbors.verlet]
+        skins = [(each.cutoff > 0, each.skin.first) for each in neighbors.verlet]
+        lengths = [0.5 * np.where(looking, first, np.inf) for looking, first in skins]
         lengths += [np.where(smallest > 0, smallest, np.inf)]
         return np.min(lengths, axis=0) / float(np.finfo(self.model.precision.numpy).eps)
 

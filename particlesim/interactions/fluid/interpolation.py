@@ -73,7 +73,7 @@ def _sums(sph: SPH, world: int, slots: slice, where: np.ndarray, samples: np.nda
     x = sph.pairs.fields["position"][slots]
     host = x.numpy().astype(np.float64)
     block = next(each for each in sph.pairs.blocks if each.world == world)
-    grid, cells = grid_over(model, block, host)
+    grid, cells = grid_over(model, block, float(sph.pairs.reach[world]), host)
     cells.first = 0  # of the slots at hand
     points = model.array(model.wrapped(where, world)[0], precision.vec3)
     # Points out of reach look into the outermost cells, so that cell numbers stay small.
