@@ -7,7 +7,7 @@ import warp as wp
 import particlesim as ps
 from cases.worlds import equal_alone, goes_on_after_reset_and_save
 from particlesim.engine.neighbors.skin import DEAR, FIRST
-from particlesim.kernels.engine.neighbors.skin import IDLE, THINNEST, WORTH
+from particlesim.kernels.engine.neighbors.skin import IDLE, SPARE, THINNEST, WORTH
 
 CUTOFF, SUBSTEPS = 1.0, 10
 
@@ -40,18 +40,18 @@ def skins(sim):
     return listed.skin.thickness
 
 
-@pytest.mark.parametrize("way", [0.001, 0.004, 0.02])
+@pytest.mark.parametrize("way", [0.0005, 0.004, 0.02, 0.06])
 def test_a_skin_is_as_thick_as_pays(way):
-    """Where (1 + s)^3 + 2 way DEAR / s is least, of what moves ``way`` cutoffs a substep.
-
-    Rows last whole substeps: their life tells ``way`` to one in 10 or better below s = 0.25, and s
-    goes at most with its root: 5 %. Beyond, to one in 3 and 16 %.
+    """Of n substeps, in which what is fastest goes ``way`` cutoffs each, the last needs a skin of
+    2 way (n - 1): (1 + 2 way (n - 1))^3 + DEAR / n is within 1% of the least that it can be.
     """
     sim = simulate(gas(way / 0.01))
     sim.run(60)
-    s = np.linspace(0.01, 1.0, 10_000)
-    best = s[np.argmin((1 + s) ** 3 + 2 * way * DEAR / s)]
-    np.testing.assert_allclose(skins(sim)[0] / CUTOFF, best, rtol=0.05 if way < 0.01 else 0.16)
+    thick = skins(sim)[0] / CUTOFF / SPARE
+    n = np.arange(1, 1000)
+    costs = (1 + 2 * way * (n - 1)) ** 3 + DEAR / n
+    cost = (1 + thick) ** 3 + DEAR / (1 + thick / (2 * way))
+    assert cost == pytest.approx(costs.min(), rel=0.01)
 
 
 def test_what_rests_has_short_rows():

@@ -125,6 +125,55 @@ def _stayed(precision: Precision, periodic: Periodicity) -> wp.Function:
     return native(stayed, snippet, after_gradients=False)
 
 
+def _raised() -> wp.Function:
+    """``rise(k, value, most)``: entry k becomes value, at least 0, if that is more; for threads."""
+    snippet = f"""
+    // Numbers that are not negative are in the order of their bits.
+    int* at = (int*){elements("most_io", "float")} + k;
+    int bits;
+    memcpy(&bits, &value, sizeof(bits));
+#if defined(__CUDA_ARCH__)
+    if (bits > *at) atomicMax(at, bits);
+#else
+    int now = __atomic_load_n(at, __ATOMIC_RELAXED);
+    while (bits > now && !__atomic_compare_exchange_n(
+        at, &now, bits, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {{}}
+#endif
+"""
+
+    def rise(k: int, value: wp.float32, most_io: wp.array(dtype=wp.float32)): ...
+
+    return native(rise, snippet, after_gradients=False)
+
+
+@functools.cache
+def positions_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
+    """Kernel: positions that rows are made from, and how far they are from the last ones."""
+    vec3, Box, image = precision.vec3, box_type(precision), minimum_image(precision, periodic)
+    rise = _raised()
+
+    @register
+    def take_positions(
+        first: int,
+        members: wp.array(dtype=wp.int32),
+        world: wp.array(dtype=wp.int32),
+        box: wp.array(dtype=Box),
+        moved: wp.array(dtype=wp.int32),
+        x: wp.array(dtype=vec3),
+        x_listed_io: wp.array(dtype=vec3),
+        farthest_squared: wp.array(dtype=wp.float32),
+    ):
+        k = first + wp.tid()
+        w = world[k]
+        if moved[w] != 0:
+            now = x[members[k]]
+            d = image(now - x_listed_io[k], box[w])
+            rise(w, wp.float32(wp.dot(d, d)), farthest_squared)
+            x_listed_io[k] = now
+
+    return take_positions
+
+
 @functools.cache
 def cell_coordinates_kernel(precision: Precision) -> wp.Kernel:
     """Cell coordinates of points from a world's first slot on: a grid is built from, asked with."""
@@ -141,22 +190,9 @@ def cell_coordinates_kernel(precision: Precision) -> wp.Kernel:
 
 
 @functools.cache
-def build_kernels(precision: Precision) -> SimpleNamespace:
-    """Kernels around a build that do not look at pairs."""
+def sorting_kernels(precision: Precision) -> SimpleNamespace:
+    """Kernels for CUDA around a build that do not look at pairs."""
     vec3, Cells = precision.vec3, cells_type(precision)
-
-    @register
-    def take_positions(
-        first: int,
-        members: wp.array(dtype=wp.int32),
-        world: wp.array(dtype=wp.int32),
-        moved: wp.array(dtype=wp.int32),
-        x: wp.array(dtype=vec3),
-        x_listed_out: wp.array(dtype=vec3),
-    ):
-        k = first + wp.tid()
-        if moved[world[k]] != 0:
-            x_listed_out[k] = x[members[k]]
 
     @register
     def spread(
@@ -187,9 +223,7 @@ def build_kernels(precision: Precision) -> SimpleNamespace:
         for a in range(3):
             planes_out[a, cells.first + k] = x_listed[member][a]
 
-    return SimpleNamespace(
-        take_positions=take_positions, spread=spread, sort_slots=sort_slots
-    )  # fmt: skip
+    return SimpleNamespace(spread=spread, sort_slots=sort_slots)
 
 
 @functools.cache

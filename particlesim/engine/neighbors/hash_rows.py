@@ -96,7 +96,7 @@ class HashRows:
         mine = [(listed.blocks[k], *grid) for k, grid in self.grids.items()]
         mine = [each for each in mine if each[0].world == w]
         to_cells = kernels.cell_coordinates_kernel(model.precision)
-        sort = kernels.build_kernels(model.precision).sort_slots
+        sort = kernels.sorting_kernels(model.precision).sort_slots
         for block, grid, place in mine:
             u = self.cell_coordinate[block.begin : block.end]
             launch(to_cells, block.count, [place, listed.x_listed, self.cell_coordinate], device)
@@ -124,7 +124,7 @@ class HashRows:
 
     def _directly(self) -> None:
         model, listed = self.model, self.listed
-        spread = kernels.build_kernels(model.precision).spread
+        spread = kernels.sorting_kernels(model.precision).spread
         launch(spread, listed.count, [listed.x_listed, self.planes], model.device)
         launch(
             rows.direct_rows_kernel(model.precision, model.periodic),

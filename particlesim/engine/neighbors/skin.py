@@ -20,7 +20,7 @@ from ..state import State
 # Of the cutoff, the first skin; and how many passes over rows a build costs. Measured. Grains have
 # few partners, so that rows cost little to hold and much to make.
 FIRST, FIRST_OF_CONTACTS = 0.12, 0.4
-DEAR, DEAR_OF_CONTACTS = 3.0, 10.0
+DEAR, DEAR_OF_CONTACTS = 3.0, 15.0
 
 
 class Skin:
@@ -42,6 +42,7 @@ class Skin:
         self.struct.thickness = model.array(self.first, wp.float64)
         self.struct.unit = model.array(unit, wp.float64)
         self.struct.since = model.array(np.full(len(unit), -np.inf), wp.float64)
+        self.struct.farthest_squared = wp.zeros(len(unit), dtype=wp.float32, device=model.device)
         self.struct.dear = model.array(np.where(contacts, DEAR_OF_CONTACTS, DEAR), wp.float64)
         self.struct.substep = float(model.settings.substep)
 
@@ -70,7 +71,7 @@ class Skin:
             launch(kernels.skin_kernels().flag_idle, len(moved), inputs, self.model.device)
 
     def choose(self, state: State, moved: wp.array) -> None:
-        """Choose those of the worlds marked as moved, by how long their rows have lasted."""
+        """Choose those of the worlds marked as moved, by how far they have, and in what time."""
         if self.chosen:
             inputs = [moved, state.time, self.struct]
             launch(kernels.skin_kernels().choose, len(moved), inputs, self.model.device)

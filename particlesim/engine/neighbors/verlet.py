@@ -174,13 +174,15 @@ class VerletList(AllPairs):
 
     def _take(self, state: State) -> None:
         """Rows of the worlds marked as moved, from the present positions."""
-        self.skin.choose(state, self.moved)
+        model, farthest = self.model, self.skin.struct.farthest_squared
         launch(
-            kernels.build_kernels(self.model.precision).take_positions,
+            kernels.positions_kernel(model.precision, model.periodic),
             self.count,
-            [self.members, self.world, self.moved, state.position, self.x_listed],
-            self.model.device,
-        )
+            [self.members, self.world, model.box, self.moved, state.position, self.x_listed,
+             farthest],
+            model.device,
+        )  # fmt: skip
+        self.skin.choose(state, self.moved)
         self.rebuild()
 
     def rebuild(self) -> None:
