@@ -23,10 +23,14 @@ from .interactions.fluid.equations_of_state import EquationOfState, Polytrope, T
 from .interactions.fluid.sph import SPH
 from .interactions.fluid.viscosities import ArtificialViscosity, Viscosity
 from .interactions.gravity import Gravity
-from .interactions.lennard_jones import LennardJones
-from .interactions.pair import PairForce, PairPotential
+from .interactions.pair_laws import PairForce, PairPotential
 from .interactions.pair_sum import PairSum
 from .interactions.particle import ConstantForce, Drag, ParticleForce, UniformGravity
+from .interactions.potentials.coulomb import Coulomb
+from .interactions.potentials.mie import LennardJones, Mie
+from .interactions.potentials.morse import Morse
+from .interactions.potentials.soft_sphere import SoftSphere
+from .interactions.potentials.yukawa import Yukawa
 from .interactions.springs import Springs
 from .output.history.writer import History, read_history
 from .output.surface import Surface
@@ -51,6 +55,7 @@ __all__ = [
     "ConstraintBase",
     "ConstraintForce",
     "Contact",
+    "Coulomb",
     "Distance",
     "Drag",
     "EquationOfState",
@@ -64,6 +69,8 @@ __all__ = [
     "Ledger",
     "LennardJones",
     "Measured",
+    "Mie",
+    "Morse",
     "PairForce",
     "PairPotential",
     "PairSum",
@@ -76,6 +83,7 @@ __all__ = [
     "Simulation",
     "SimulationError",
     "SimulationWarning",
+    "SoftSphere",
     "SphereBoundary",
     "Springs",
     "Stability",
@@ -88,6 +96,7 @@ __all__ = [
     "UniformGravity",
     "UsdRecorder",
     "Viscosity",
+    "Yukawa",
     "__version__",
     "launch",
     "law",

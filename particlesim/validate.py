@@ -59,6 +59,16 @@ def number(
     return result
 
 
+def table(owner: str, argument: str, value: Any, **bounds: Any) -> float | np.ndarray:
+    """``value`` as a number, or as an array of numbers within bounds."""
+    if np.ndim(value) == 0:
+        return number(owner, argument, value, **bounds)
+    given = np.asarray(value, dtype=np.float64)
+    for each in given.ravel():
+        number(owner, argument, each, **bounds)
+    return given
+
+
 def whole(owner: str, argument: str, value: Any, *, minimum: int = 0) -> int:
     """``value`` as an int of at least ``minimum``."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < minimum:

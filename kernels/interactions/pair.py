@@ -9,7 +9,7 @@ import warp as wp
 from ..engine.loops import Pairs, Periodicity, Term, box_type, plain_loop, reader
 from ..engine.packed import FLAGS, packed_loop
 from ..precision import APART, Precision, function, function_from_source, register
-from ..warp_internals import arguments as arguments_of
+from .calls import Call
 
 # A pair closer than p.closest is taken as that far apart, along a fixed direction: coincident
 # particles then push each other apart, equally and opposite.
@@ -23,82 +23,48 @@ _SEPARATION = """
 _ALONG = "    along = x_ij + aside * wp.where(apart, real(0.0), side * r)\n"
 
 
-# A potential whose first argument is called so takes r^2, and so does a force, to give F / r.
-SQUARED = "distance_squared"
-
-
-def _of_distance(law: wp.Function, arguments: list[str]) -> tuple[str, bool]:
-    """A call of a law at the distance of the pair, and whether it takes the square."""
-    squared = next(iter(arguments_of(law))) == SQUARED
-    return f"law({', '.join(['square' if squared else 'r', *arguments])})", squared
-
-
-def _derived(law: wp.Function, arguments: list[str]) -> tuple[str, str]:
-    """Source that derives a potential, with a value of it, and F / r then."""
-    call, squared = _of_distance(law, arguments)
-    names = ", ".join(f"g{k}" for k in range(len(arguments) + 1))
-    evaluate = f"    {names} = wp.grad(law){call.removeprefix('law')}\n"
-    return evaluate, "real(-2.0) * g0" if squared else "-g0 / r"
-
-
 def force_term(
-    law: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any,
-    derivative: bool, rounding: str,
-) -> Term:  # fmt: skip
+    call: Call, precision: Precision, data: Any, params: Any, derivative: bool, rounding: str
+) -> Term:
     """Term f_ij = F(r) x_ij / r, with F the law itself or minus the derivative of an energy.
 
-    ``arguments`` are the source of the law's arguments after ``r``, in terms of i, j, d and p;
     ``rounding`` is how the compiler may have it.
     """
-    if derivative:
-        evaluate, w = _derived(law, arguments)
-    else:
-        call, squared = _of_distance(law, arguments)
-        evaluate, w = "", call if squared else f"{call} / r"
-    evaluate += f"    w = {w}"
-    result = "pair2(w, wp.where(apart, real(0.0), side * w * r))"
-    names_of = {"law": law, "pair2": precision.vector(2)}
-    made = _term("pair_force", evaluate, result, names_of, precision, data, params)
+    evaluate = call.derivative if derivative else call.force
+    evaluate += f"    of_pair = {call.selection.counted('w')}"
+    result = "pair2(of_pair, wp.where(apart, real(0.0), side * of_pair * r))"
+    made = _of_law("pair_force", call, evaluate, result, precision, data, params)
     return Term(made, 3, APART, rounding)
 
 
-def measure_term(
-    energy: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any
-) -> Term:
+def measure_term(call: Call, precision: Precision, data: Any, params: Any) -> Term:
     """Term (u_ij / 2, w_ij / 2) of the potential energy and of the virial w = -r du/dr."""
-    evaluate, w = _derived(energy, arguments)
-    call, _squared = _of_distance(energy, arguments)
-    evaluate += f"    u = {call}\n    w = {w}\n    half = real(0.5)"
-    names_of = {"law": energy, "pair2": precision.vector(2)}
-    result = "pair2(half * u, half * w * square)"
-    return Term(_term("pair_measure", evaluate, result, names_of, precision, data, params), 2)
+    evaluate = f"{call.derivative}{call.potential}    half = real(0.5)"
+    u, w = (call.selection.counted(each) for each in ("half * u", "half * w * square"))
+    made = _of_law("pair_measure", call, evaluate, f"pair2({u}, {w})", precision, data, params)
+    return Term(made, 2)
 
 
-def virial_term(
-    force: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any
-) -> Term:
+def virial_term(call: Call, precision: Precision, data: Any, params: Any) -> Term:
     """Term (0, r F / 2) of a force that is given."""
-    squared = _of_distance(force, arguments)[1]
-    result = f"pair2(real(0.0), real(0.5) * {'square' if squared else 'r'} * f)"
-    return _plain_term("pair_virial", force, arguments, result, precision, data, params)
+    result = f"pair2(real(0.0), {call.selection.counted('real(0.5) * w * square')})"
+    made = _of_law("pair_virial", call, call.force, result, precision, data, params)
+    return Term(made, 2)
 
 
-def energy_term(
-    energy: wp.Function, arguments: list[str], precision: Precision, data: Any, params: Any
-) -> Term:
+def energy_term(call: Call, precision: Precision, data: Any, params: Any) -> Term:
     """Term (u_ij / 2, 0) of the potential energy alone."""
-    result = "pair2(real(0.5) * f, real(0.0))"
-    return _plain_term("pair_energy", energy, arguments, result, precision, data, params)
+    result = f"pair2({call.selection.counted('real(0.5) * u')}, real(0.0))"
+    made = _of_law("pair_energy", call, call.potential, result, precision, data, params)
+    return Term(made, 2)
 
 
-def _plain_term(
-    name: str, law: wp.Function, arguments: list[str], result: str, precision: Precision,
-    data: Any, params: Any,
-) -> Term:  # fmt: skip
-    """A term of a law's value f."""
-    evaluate = f"    f = {_of_distance(law, arguments)[0]}"
-    names_of = {"law": law, "pair2": precision.vector(2)}
-    return Term(_term(name, evaluate, result, names_of, precision, data, params), 2)
+def _of_law(
+    name: str, call: Call, evaluate: str, result: str, precision: Precision, data: Any, params: Any
+) -> wp.Function:
+    names = {"law": call.law, "pair2": precision.vector(2), **call.selection.functions()}
+    lines = call.selection.source() + evaluate
+    return _term(name, lines, result, names, precision, data, params)
 
 
 def sum_term(

@@ -10,7 +10,7 @@ import warp as wp
 
 from .. import validate
 from ..engine.model import Model
-from ..interactions.arguments import Arguments
+from ..interactions.laws.arguments import Arguments
 from ..kernels.constraints import boundary_shapes as kernels
 from ..kernels.precision import FLOAT64, Precision, structure
 from ..scene.law import Law

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -18,14 +17,18 @@ from ..engine.probe import Probe
 from ..engine.state import State
 from ..kernels.engine.loops import Term
 from ..kernels.interactions import pair as kernels
+from ..kernels.interactions.calls import CUT, SWITCH, Call
 from ..scene.law import Law
-from ..scene.law import law as make_law
 from ..scene.part import Interaction
-from .arguments import Arguments
-from .consistency import is_ordinary, of_pair_force
-from .exchange import is_symmetric, named
+from .laws.arguments import Arguments
+from .laws.consistency import is_ordinary, of_pair_force
+from .laws.exchange import is_symmetric
 from .pair_limits import collisions
 from .pair_loop import PairLoop, check_names, squared_distances
+from .selection import Chosen
+
+TRUNCATIONS = ("cut", "shift", "force_shift", "xplor")
+SWITCHED = 0.8  # of the cutoff, from where on a potential is smoothed if nothing else is said
 
 
 class Pair(Interaction):
@@ -38,10 +41,21 @@ class Pair(Interaction):
     Args:
         potential: Law ``u(r, ...)`` [energy], or None.
         force: Law ``F(r, ...)`` [force], positive where it repels, or None.
-        group: Which particles interact with each other; None: all.
-        cutoff: Distance beyond which there is no force [length]; None: all pairs.
-        parameters: Values of the law's further parameters. Parameters that are not given are
-            quantities of the two particles, named ``mass_i``, ``charge_j`` and so on.
+        group: Which particles interact with each other; None: all. Where something goes by kinds a
+            list of groups, of which each is a kind.
+        cutoff: Distance beyond which there is no force [length]; None: all pairs. Or by kinds,
+            (kinds, kinds).
+        parameters: Values of the law's further parameters, numbers or by kinds. Parameters that are
+            not given are quantities of the two particles, named ``mass_i``, ``charge_j`` and so on.
+        groups: Two groups, of which each feels only the other, in place of ``group``.
+        exclude: Pairs that do not feel each other: a part that holds particles together, as
+            ``Bonds`` or ``Angles`` (whose ends do not), (m, 2) indices, or a list of these.
+        truncation: ``"cut"`` leaves the law as it is up to the cutoff; ``"shift"`` subtracts what
+            the potential is there; ``"force_shift"`` also the line that makes the force continuous
+            (Toxvaerd and Dyre 2011); ``"xplor"`` multiplies the potential, from ``switch`` on, with
+            what takes it and its force to 0 smoothly (Brooks et al. 1983): x = r^2,
+            (c - x)^2 (c + 2 x - 3 a) / (c - a)^3 from a = (switch cutoff)^2 to c = cutoff^2.
+        switch: In parts of the cutoff.
     """
 
     def __init__(
@@ -49,15 +63,35 @@ class Pair(Interaction):
         potential: Law | None,
         force: Law | None,
         group: Any,
-        cutoff: float | None,
+        cutoff: Any,
         parameters: dict[str, Any],
+        *,
+        groups: Any = None,
+        exclude: Any = None,
+        truncation: str = "cut",
+        switch: float = SWITCHED,
     ):
+        self.truncation = validate.choice(self.name, "truncation", truncation, TRUNCATIONS)
         self.potential, self.force, self.group = potential, force, group
+        truncated = truncation != "cut"
+        self.switch = validate.number(self.name, "switch", switch, above=0.0, maximum=0.99)
+        self.chosen = Chosen(
+            self.name, group, groups, cutoff, parameters, exclude, truncated=truncated
+        )
+        if self.chosen.kinds:
+            self.group = self.chosen.group
+        parameters = self.chosen.plain
+        most = np.max(cutoff) if np.ndim(cutoff) == 2 else cutoff
         self.cutoff = (
             None
             if cutoff is None
-            else validate.number(self.name, "cutoff", cutoff, above=0.0, unit="length")
+            else validate.number(self.name, "cutoff", most, above=0.0, unit="length")
         )
+        if truncated and cutoff is None:
+            raise validate.fail(
+                self.name, "cutoff", f"be given with truncation={truncation!r} [length]", None,
+                "give one, or leave the law as it is",
+            )  # fmt: skip
         self.laws = [each for each in (potential, force) if each is not None]
         for each in self.laws:
             if not each.parameters:
@@ -92,7 +126,10 @@ class Pair(Interaction):
 
     def kind(self) -> tuple[Any, ...]:
         laws = [each and each.key for each in (self.potential, self.force)]
-        return (type(self), *laws, self.cutoff is None, tuple(self.parameters))
+        what = tuple(self.parameters)
+        return (
+            type(self), *laws, self.cutoff is None, what, self.truncation, *self.chosen.kind
+        )  # fmt: skip
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
@@ -101,7 +138,12 @@ class Pair(Interaction):
         # Of the laws as they are now.
         self.functions = [each.function(model.precision, self.name, float) for each in self.laws]
         self.pairs = neighbors.of(self, self.quantities)
-        columns = self.columns(self.parameters)
+        self.chosen.prepare(model, self.peers, self.pairs)
+        largest = float(np.finfo(model.precision.numpy).max)
+        columns = self.columns(self.parameters) | self.chosen.columns(self.peers, largest)
+        if self.truncation != "cut":
+            columns[CUT] = np.array([peer.cutoff for peer in self.peers])
+            columns[SWITCH] = np.array([peer.switch for peer in self.peers])
         model.fits(self.name, columns)
         cutoff = None if self.cutoff is None else np.array([peer.cutoff for peer in self.peers])
         columns |= squared_distances(self.name, model, cutoff)
@@ -111,9 +153,14 @@ class Pair(Interaction):
     def attach(self, model: Model, state: State) -> None:
         fields = self.fields_of(self.pairs)
         self.loop = PairLoop.over(model, self.pairs, "Pair", fields, self.Params, self.params)
-        derived = self.force is None
-        rounding = "any" if derived and is_ordinary(self) else "fused"
-        self.term = self._term(kernels.force_term, -1, derivative=derived, rounding=rounding)
+        rounding = "any" if self.derived and is_ordinary(self) else "fused"
+        k = 0 if self.derived else -1
+        self.term = self._term(kernels.force_term, k, derivative=self.derived, rounding=rounding)
+
+    @property
+    def derived(self) -> bool:
+        """Its force comes of its potential, as it does where that is smoothed."""
+        return self.force is None or self.truncation == "xplor"
 
     @property
     def reciprocal(self) -> bool:
@@ -136,14 +183,14 @@ class Pair(Interaction):
     def fields_of(self, pairs: AllPairs) -> dict[str, wp.array]:
         """What the term reads, in the order of a list's slots."""
         own = {name: pairs.fields[name] for name in self.quantities if name != "position"}
-        return {"x": pairs.fields["position"], **own}
+        return {"x": pairs.fields["position"], **own, **self.chosen.fields}
 
     def _term(self, make: Callable[..., Term], k: int, **options: Any) -> Term:
         """A term of the k-th law."""
         precision = self.model.precision
         arguments = self.arguments[k].source({"_i": "i", "_j": "j"})
-        law, Data = self.functions[k], self.loop.Data
-        return make(law, arguments, precision, Data, self.Params, **options)
+        call = Call(self.functions[k], tuple(arguments), self.chosen.selection, self.truncation)
+        return make(call, precision, self.loop.Data, self.Params, **options)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         self.loop.sum(self.term, kernels.add_force, {"f": state.force})
@@ -154,7 +201,7 @@ class Pair(Interaction):
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         out = {"energy": energy, "virial": virial}
-        if self.force is None:
+        if self.derived:
             terms = [self._term(kernels.measure_term, 0)]
         else:
             terms = [self._term(kernels.virial_term, -1)]
@@ -162,76 +209,3 @@ class Pair(Interaction):
                 terms.append(self._term(kernels.energy_term, 0))
         for term in terms:
             self.loop.sum(term, kernels.store_measure, out)
-
-
-class PairPotential(Pair):
-    """Pair force from an energy law: f = -du/dr, derived by ``wp.grad`` inside the kernel.
-
-    Args:
-        law: ``u(r, ...)`` [energy]; made by :func:`particlesim.scene.law` or a plain function. One
-            whose first parameter is called ``distance_squared`` gets r^2, which saves a root.
-        group: Which particles interact with each other; None: all.
-        cutoff: Distance beyond which there is no force [length]; None: all pairs of a world.
-        **parameters: The law's further parameters; those not given are quantities of the two
-            particles (``charge_i``, ``mass_j``), which the law must treat alike.
-
-    Raises:
-        ValueError: When a simulation is made, of a law that is another with i and j exchanged: it
-            would break Newton's third law, and keep neither momentum nor energy.
-
-    Example:
-        >>> @law
-        ... def yukawa(r: float, strength: float, screening: float):
-        ...     return strength * wp.exp(-r / screening) / r
-        >>> PairPotential(yukawa, cutoff=5.0, strength=1.0, screening=0.7).parameters
-        {'strength': 1.0, 'screening': 0.7}
-    """
-
-    def __init__(self, law: Any, group: Any = None, *, cutoff: float | None, **parameters: Any):
-        super().__init__(make_law(law), None, group, cutoff, parameters)
-
-    def attach(self, model: Model, state: State) -> None:
-        super().attach(model, state)
-        if not self.reciprocal:
-            raise validate.fail(
-                self.name, f"law {self.laws[0].name}", "be the same with i and j exchanged",
-                ", ".join(named(self.arguments[0])),
-                "name each quantity of both particles and treat them alike, as in mass_i * mass_j; "
-                "a PairForce may differ",
-            )  # fmt: skip
-
-
-class PairForce(Pair):
-    """Pair force F(r) along the pair, given directly; positive repels.
-
-    Arguments as for :class:`PairPotential`; a law of ``distance_squared`` gives F / r. No energy is
-    reported. A law that is another with i and j exchanged, as ``charge_i * mass_j`` is, gives
-    forces that are not opposite: i feels F of (i, j), j feels F of (j, i), and momentum is not
-    kept. A warning says so, once for each law.
-
-    Example:
-        >>> @law
-        ... def repel(r: float, stiffness: float):
-        ...     return stiffness * (1.0 - r)
-        >>> PairForce(repel, cutoff=1.0, stiffness=10.0).cutoff
-        1.0
-    """
-
-    def __init__(self, law: Any, group: Any = None, *, cutoff: float | None, **parameters: Any):
-        super().__init__(None, make_law(law), group, cutoff, parameters)
-
-    def attach(self, model: Model, state: State) -> None:
-        super().attach(model, state)
-        law = self.laws[0]
-        if law.content not in _WARNED and not self.reciprocal:
-            _WARNED.add(law.content)
-            names = ", ".join(named(self.arguments[0]))
-            warnings.warn(
-                f"{self.name}: law {law.name} is another with i and j exchanged ({names}): forces "
-                "are not opposite, and momentum is not kept. Name each quantity of both particles "
-                "and treat them alike if that is not meant.",
-                stacklevel=2,
-            )
-
-
-_WARNED: set[str] = set()  # contents of laws

@@ -123,7 +123,7 @@ def largest_step(r: np.ndarray, a: np.ndarray, speed: float, most: float) -> flo
 def _couples(part: Any, probe: Probe, members: np.ndarray) -> np.ndarray:
     """Pairs to ask the law with, (k, 2): the two lightest, and some more if they are not alike."""
     lightest = members[np.argsort(-probe.inverse_mass[members], kind="stable")[:2]]
-    if not part.quantities:
+    if not part.quantities and not part.chosen.kinds:
         return lightest[None, :]
     rng = np.random.default_rng(0)
     others = [rng.choice(members, 2, replace=False) for _ in range(COUPLES - 1)]
@@ -157,6 +157,7 @@ def forces(part: Any, probe: Probe, w: int, couples: np.ndarray, r: np.ndarray) 
     for name in part.quantities - {"position"}:
         source = probe.state[name]
         fields[name] = model.array(source.numpy()[particle], source.dtype)
+    fields |= part.chosen.of(particle)
     f = wp.zeros(2 * count, dtype=precision.vec3, device=model.device)
     listed = SimpleNamespace(
         pairs=pairs, partners=part.pairs.partners,

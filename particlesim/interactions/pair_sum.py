@@ -17,7 +17,7 @@ from ..kernels.interactions import pair as kernels
 from ..scene.law import Law
 from ..scene.law import law as make_law
 from ..scene.part import Interaction
-from .arguments import Arguments
+from .laws.arguments import Arguments
 from .pair_loop import OWN, PairLoop, check_names, squared_distances
 
 # What a law may name of the pair, and how many numbers it returns by what it says it returns.

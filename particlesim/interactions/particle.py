@@ -18,8 +18,8 @@ from ..kernels.precision import FLOAT64
 from ..scene.law import Law, law
 from ..scene.law import law as make_law
 from ..scene.part import Interaction
-from .arguments import WIDTHS, Arguments
-from .consistency import of_particle_force
+from .laws.arguments import WIDTHS, Arguments
+from .laws.consistency import of_particle_force
 from .pulses import unseen
 
 

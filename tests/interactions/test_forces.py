@@ -42,7 +42,7 @@ def screened(r: float, charge_i: float, charge_j: float, screening: float = 0.7)
 
 SMOOTH = {
     "lennard_jones": lambda: ps.LennardJones(cutoff=1.9, truncation="force_shift"),
-    "mie": lambda: ps.LennardJones(cutoff=1.9, exponents=(50, 49), truncation="force_shift"),
+    "mie": lambda: ps.Mie(cutoff=1.9, exponents=(50, 49), truncation="force_shift"),
     "derived": lambda: ps.PairPotential(screened, cutoff=None),
     "gravity": lambda: ps.Gravity(G=2.0, softening=0.3),
     "springs": lambda: ps.Springs([(0, 1), (1, 2), (2, 5), (0, 9)], [1.0, 2.0, 3.0, 4.0], 0.7),
@@ -85,7 +85,7 @@ def test_mie_has_its_well(exponents, device, simulate):
     n, m = exponents
     scene = ps.Scene()
     scene.add_particles([(0, 0, 0), (0.7 * (n / m) ** (1 / (n - m)), 0, 0)])
-    scene.add_interaction(ps.LennardJones(epsilon=1.3, sigma=0.7, cutoff=5.0, exponents=exponents))
+    scene.add_interaction(ps.Mie(epsilon=1.3, sigma=0.7, cutoff=5.0, exponents=exponents))
     sim = simulate(scene, device, precision="float64")
     sim.forces(0.0)
     # Powers up to 50 of a distance right to 1 eps, times the strength (136 for 50, 49).

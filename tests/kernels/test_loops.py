@@ -46,7 +46,7 @@ def mie(n, m, truncation):
     u_cut = plain(CUTOFF) if truncation != "cut" else 0.0
     f_cut = -slope(CUTOFF) if truncation == "force_shift" else 0.0
     return Case(
-        lambda: ps.LennardJones(cutoff=CUTOFF, exponents=(n, m), truncation=truncation),
+        lambda: ps.Mie(cutoff=CUTOFF, exponents=(n, m), truncation=truncation),
         lambda r, c: plain(r) - u_cut + (r - CUTOFF) * f_cut,
         lambda r, c: -slope(r) - f_cut,
     )

@@ -58,7 +58,7 @@ def test_scenes_of_different_kinds(other, says, refused):
 @pytest.mark.parametrize(
     ("one", "two"),
     [
-        (ps.LennardJones(), ps.LennardJones(exponents=(9, 6))),
+        (ps.LennardJones(), ps.Mie(exponents=(9, 6))),
         (ps.Gravity(), ps.UniformGravity()),
         (ps.PairPotential(screened, cutoff=1.0, screening=1.0),
          ps.PairPotential(screened, cutoff=None, screening=1.0)),

@@ -52,7 +52,7 @@ def skin_kernels() -> SimpleNamespace:
     """Kernels over worlds: rows that reach too far are given up; a skin for those to be made."""
     best = function(_best)
 
-    @register
+    @functools.partial(register, cpu_only=True)
     def flag_idle(
         first: int,
         skins: Skins,
@@ -69,7 +69,7 @@ def skin_kernels() -> SimpleNamespace:
                 moved[w] = 1
                 any_moved[0] = 1
 
-    @register
+    @functools.partial(register, cpu_only=True)
     def choose_skins(
         first: int, moved: wp.array(dtype=wp.int32), time: wp.array(dtype=wp.float64), skins: Skins
     ):

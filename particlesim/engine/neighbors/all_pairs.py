@@ -35,6 +35,7 @@ class AllPairs:
         self.order = self.members
         self.names: set[str] = {"position"}
         self.fields: dict[str, wp.array] = {}
+        self.held: list[tuple[wp.array, wp.array]] = []  # that never change, and by slot
         self.pairs = Pairs()
         self.pairs.world = self.world
         self.pairs.begin = model.array(self.begin_host, wp.int32)
@@ -63,6 +64,11 @@ class AllPairs:
         """Have these per-particle arrays ready in slot order at every update."""
         self.names |= names
 
+    def hold(self, array: wp.array) -> wp.array:
+        """An array in slot order, of one by particle that never changes."""
+        self.held.append((array, self.array(array.dtype)))
+        return self.held[-1][1]
+
     def allocate(self, state: State) -> None:
         """Make the arrays, once all requests are in."""
         if self.partners == ALL:
@@ -77,6 +83,7 @@ class AllPairs:
                 self.fields[name] = self.array(source.dtype)
             else:
                 self.fields[name] = source
+        self.sort_held()
 
     def update(self, state: State, *, for_constraint: bool = False) -> None:
         """Bring the slot-ordered copies up to date."""
@@ -84,16 +91,18 @@ class AllPairs:
 
     def gather(self, state: State, names: set[str]) -> None:
         """Copy these arrays into slot order; nothing to do where that is their own order."""
-        if not self.sorted:
-            return
-        for name in sorted(names):
-            target = self.fields[name]
-            launch(
-                kernels.gather_kernel(target.dtype),
-                self.count,
-                [self.order, state[name], target],
-                self.model.device,
-            )
+        if self.sorted:
+            for name in sorted(names):
+                self._gather(state[name], self.fields[name])
+
+    def sort_held(self) -> None:
+        """Bring what never changes into the order of the slots."""
+        for source, target in self.held:
+            self._gather(source, target)
+
+    def _gather(self, source: wp.array, target: wp.array) -> None:
+        gather = kernels.gather_kernel(target.dtype)
+        launch(gather, self.count, [self.order, source, target], self.model.device)
 
     def sum(self, kernel: wp.Kernel, inputs: Sequence[Any]) -> None:
         """Launch a sum over the partners of every slot, by clusters."""

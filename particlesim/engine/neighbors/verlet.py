@@ -191,6 +191,7 @@ class VerletList(AllPairs):
         reach = reach_kernel(self.model.precision)
         launch(reach, self.model.world_count, inputs, self.model.device)
         self.layout.rebuild()
+        self.sort_held()
         call(self.moved.zero_)
         call(self.any_moved.zero_)
 

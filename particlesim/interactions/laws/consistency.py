@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..engine.model import Model
-from ..kernels.precision import FLOAT64
+from ...engine.model import Model
+from ...kernels.precision import FLOAT64
 from .arguments import Arguments
 from .trial import of_pairs, of_particles, quantity
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 import warp as wp
 
-from ..engine.model import Model
-from ..kernels.interactions.pair import SQUARED
-from ..kernels.interactions.values import values_kernel
-from ..kernels.precision import FLOAT64, Precision, annotation, structure
+from ...engine.model import Model
+from ...kernels.interactions.calls import SQUARED
+from ...kernels.interactions.values import values_kernel
+from ...kernels.precision import FLOAT64, Precision, annotation, structure
 from .arguments import QUANTITIES, Arguments
 
 

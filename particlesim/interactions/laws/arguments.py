@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from .. import validate
-from ..scene.law import Law
+from ... import validate
+from ...scene.law import Law
 
 # Per-particle quantities that a law may name, beside the attributes of the scene.
 QUANTITIES = frozenset({"position", "velocity", "mass", "radius", "density"})

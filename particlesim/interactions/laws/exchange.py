@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..engine.model import Model
+from ...engine.model import Model
 from .arguments import QUANTITIES, Arguments
 from .trial import of_pairs, quantity
 

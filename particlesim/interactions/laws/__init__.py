@@ -1,0 +1,1 @@
+"""Laws of forces: what fills their arguments, and whether they are what they should be."""

@@ -1,0 +1,1 @@
+"""Ready potentials between pairs, one file a law."""
