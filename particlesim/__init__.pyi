@@ -19,6 +19,7 @@ from .instruments.ledger.ledger import Ledger
 from .instruments.profile import Profile
 from .instruments.stability import Stability, StabilityWarning
 from .instruments.watchdog.incident import Incident, SimulationError, SimulationWarning
+from .interactions.electrostatics.electrostatics import Electrostatics
 from .interactions.fluid.equations_of_state import EquationOfState, Polytrope, Tait
 from .interactions.fluid.sph import SPH
 from .interactions.fluid.viscosities import ArtificialViscosity, Viscosity
@@ -58,6 +59,7 @@ __all__ = [
     "Coulomb",
     "Distance",
     "Drag",
+    "Electrostatics",
     "EquationOfState",
     "Gravity",
     "Group",

@@ -1,0 +1,1 @@
+"""Charges in open space and in periodic boxes."""

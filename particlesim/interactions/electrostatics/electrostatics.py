@@ -1,0 +1,169 @@
+"""Coulomb forces between the charges of a scene."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ... import validate
+from ...engine.execution.launch import launch
+from ...engine.limit import Limit
+from ...engine.model import Model
+from ...engine.neighbors.lists import Neighbors
+from ...engine.probe import Probe
+from ...engine.state import State
+from ...kernels.interactions.charges import charge_kernels
+from ...scene.group import select
+from ...scene.part import Interaction
+from ..pair_limits import collisions
+from ..potentials.coulomb import Coulomb
+from .splitting import split
+from .waves import Waves
+
+METHODS = ("all_pairs", "damped_shifted_force", "ewald")
+
+
+class Electrostatics(Interaction):
+    """u = k q_i q_j / r between the particles' attributes ``charge``, by a method of choice.
+
+    ``"all_pairs"`` looks at all pairs of a world, in open space. ``"damped_shifted_force"`` ends
+    the force at a cutoff (Fennell and Gezelter 2006): see :class:`Coulomb`. ``"ewald"`` sums over
+    all periodic images (Ewald 1921): near pairs by erfc(a r) / r up to a cutoff, and waves, by the
+    kernels of ``nvalchemi-toolkit-ops`` (extra ``electrostatics``),
+
+        U = k sum_(i<j) q_i q_j erfc(a r) / r
+            + 2 pi k / V sum_(q != 0) exp(-q^2 / 4 a^2) / q^2 |S(q)|^2 - k a / sqrt(pi) sum_i q_i^2
+
+    of images that a conductor surrounds. Charges that do not add up to 0 are neutralised by a
+    uniform background. The waves' phases take 16 bytes a wave and particle: it is for thousands of
+    charges.
+
+    Args:
+        method: One of these three.
+        group: Which particles' charges; None: all.
+        constant: k [energy length / charge^2].
+        cutoff: Of near pairs [length], for the last two; with ``"ewald"`` None: what costs least.
+        damping: a [1/length], of ``"damped_shifted_force"``.
+        tolerance: Of ``"ewald"``: what both sums may leave out, in parts.
+
+    Raises:
+        ValueError: An open axis with ``"ewald"``, a cutoff where none is taken or the reverse.
+        ImportError: ``"ewald"`` without the library.
+
+    Example:
+        >>> Electrostatics("damped_shifted_force", cutoff=6.0, damping=0.3).cutoff
+        6.0
+    """
+
+    conservative = True
+
+    def __init__(
+        self,
+        method: str = "all_pairs",
+        group: Any = None,
+        constant: float = 1.0,
+        cutoff: float | None = None,
+        damping: float = 0.0,
+        tolerance: float = 1e-6,
+    ):
+        self.method = validate.choice(self.name, "method", method, METHODS)
+        self.group, self.constant = group, validate.number(self.name, "constant", constant)
+        self.tolerance = validate.number(self.name, "tolerance", tolerance, above=0.0, maximum=0.1)
+        if (method == "all_pairs") != (cutoff is None) and method != "ewald":
+            what = "be left out" if method == "all_pairs" else "be given [length]"
+            raise validate.fail(
+                self.name, "cutoff", f"{what} with method={method!r}", cutoff, "choose another"
+            )
+        if damping and method != "damped_shifted_force":
+            raise validate.fail(
+                self.name, "damping", f"be left out with method={method!r}", damping,
+                "it is for 'damped_shifted_force'",
+            )  # fmt: skip
+        self.requires = frozenset({"force", "charge"})
+        self.cutoff = cutoff
+        self.pairs = Coulomb(group, constant, cutoff, damping)
+
+    def kind(self) -> tuple[Any, ...]:
+        return (type(self), self.method, *self.pairs.kind())
+
+    def prepare(self, model: Model, neighbors: Neighbors) -> None:
+        self.model, self.waves = model, list[Waves]()
+        pairs = [peer.pairs for peer in self.peers]
+        if self.method == "ewald":
+            pairs = self._split(model)
+        self.near = pairs[0].bind(pairs)
+        self.near.prepare(model, neighbors)
+
+    def _split(self, model: Model) -> list[Coulomb]:
+        """Waves of every world, and its near pairs."""
+        parts, pairs = [], []
+        for w, peer in enumerate(self.peers):
+            parts.append(select(model.scenes[w], peer.group, self.name))
+            box = model.box_length[w]
+            found = split(np.where(box > 0, box, 1.0), len(parts[w]), peer.tolerance, peer.cutoff)
+            self.waves.append(Waves(self.name, model, w, found))
+            given = peer.group, peer.constant, found.cutoff, found.damping
+            pairs.append(Coulomb(*given, truncation="cut"))
+        member = np.zeros(model.particle_count)
+        member[np.concatenate([rows + model.offsets[w] for w, rows in enumerate(parts)])] = 1.0
+        precision, device = model.precision, model.device
+        self.member = model.array(member, precision.scalar)
+        self.taken = wp.zeros_like(self.member)
+        self.constants = model.array([peer.constant for peer in self.peers], precision.scalar)
+        self.world = model.array(model.world_of, wp.int32)
+        self.field = wp.zeros(model.particle_count, dtype=precision.vec3, device=device)
+        self.energies = [
+            wp.zeros(model.particle_count, dtype=wp.float64, device=device) for _ in range(2)
+        ]
+        return pairs
+
+    def attach(self, model: Model, state: State) -> None:
+        self.near.attach(model, state)
+
+    def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        self.near.apply(state, neighbors, dt)
+        if self.waves:
+            self._waves(state)
+            inputs = [self.constants, self.world, self.field, state.force]
+            launch(self._kernels.force, len(self.taken), inputs, self.model.device)
+
+    def _waves(self, state: State) -> None:
+        inputs = [state.charge, self.member, self.taken]
+        launch(self._kernels.take, len(self.taken), inputs, self.model.device)
+        for each in self.waves:
+            each.act(state, self.taken, self.energies[0], self.field)
+
+    @property
+    def _kernels(self) -> Any:
+        return charge_kernels(self.model.precision)
+
+    def limits(self, probe: Probe) -> list[Limit]:
+        """By the gradient at the present distances and, within a cutoff, at those to come."""
+        near = [] if self.near.cutoff is None else collisions(self.near, probe)
+        return probe.response(self) + near
+
+    def complaint(self) -> str:
+        """That charges of a periodic box are not neutral; what pairs have to say."""
+        for w, each in enumerate(self.waves):
+            q = self.model.column("charge")[each.rows] * self.member.numpy()[each.rows]
+            if abs(q.sum()) > 1e-6 * np.abs(q).sum():
+                return (
+                    f"{self.name}: charges must add up to 0 in a periodic box, got {q.sum():.4g} "
+                    f"in world {w}, which a uniform background neutralises; add what is missing."
+                )
+        return self.near.complaint()
+
+    def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
+        if not self.waves:
+            self.near.measure(state, energy, virial)
+            return
+        near, unused = (wp.zeros_like(energy) for _ in range(2))
+        self.near.measure(state, near, unused)
+        self._waves(state)
+        raw, own = self.energies
+        for each in self.waves:
+            each.correct(self.taken, raw, own)
+        inputs = [self.constants, self.world, own, near, energy, virial]
+        launch(self._kernels.energy, len(self.taken), inputs, self.model.device)
