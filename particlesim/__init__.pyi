@@ -20,6 +20,9 @@ from .instruments.profile import Profile
 from .instruments.stability import Stability, StabilityWarning
 from .instruments.watchdog.incident import Incident, SimulationError, SimulationWarning
 from .interactions.electrostatics.electrostatics import Electrostatics
+from .interactions.fields.field_force import FieldForce
+from .interactions.fields.poisson import PoissonField
+from .interactions.fields.wave import GridField
 from .interactions.fluid.equations_of_state import EquationOfState, Polytrope, Tait
 from .interactions.fluid.sph import SPH
 from .interactions.fluid.viscosities import ArtificialViscosity, Viscosity
@@ -61,7 +64,9 @@ __all__ = [
     "Drag",
     "Electrostatics",
     "EquationOfState",
+    "FieldForce",
     "Gravity",
+    "GridField",
     "Group",
     "History",
     "Incident",
@@ -78,6 +83,7 @@ __all__ = [
     "PairSum",
     "ParticleForce",
     "PlaneBoundary",
+    "PoissonField",
     "Polytrope",
     "Profile",
     "Scene",

@@ -63,10 +63,12 @@ def table(owner: str, argument: str, value: Any, **bounds: Any) -> float | np.nd
     """``value`` as a number, or as an array of numbers within bounds."""
     if np.ndim(value) == 0:
         return number(owner, argument, value, **bounds)
-    given = np.asarray(value, dtype=np.float64)
+    given = np.asarray(value)
+    if given.ndim > 2 or given.dtype.kind not in "iuf":
+        raise fail(owner, argument, "be a number, or numbers by kinds", value, "give one number")
     for each in given.ravel():
         number(owner, argument, each, **bounds)
-    return given
+    return given.astype(np.float64)
 
 
 def whole(owner: str, argument: str, value: Any, *, minimum: int = 0) -> int:

@@ -65,6 +65,8 @@ class Loop:
             if part.reads_velocity is None:
                 part.reads_velocity = _names_velocity(type(part))
         self.implicit = [part for part in self.interactions if part.implicit]
+        still = Interaction.advance
+        self.moving = [part for part in self.interactions if type(part).advance is not still]
         self.state.require({"position", "velocity"} | required)
         self.integrator = moves(
             model, self.state, constrained=bool(self.constraints),
@@ -87,6 +89,9 @@ class Loop:
         self.forces(dt)
         self.follow(dt)
         act(self.integrator, self.integrator.advance, dt)
+        for interaction in self.moving:
+            with owner(interaction.name):
+                act(interaction, interaction.advance, self.state, dt)
         self.constrain(dt, self.settings.iterations)
         act(self.integrator, self.integrator.finish, dt)
         now = self.state, self.neighbors, dt

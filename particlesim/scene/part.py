@@ -165,6 +165,12 @@ class Interaction(Part):
         """Add forces."""
         raise validate.undefined(self, "apply(self, state, neighbors, dt)")
 
+    def advance(self, state: Any, dt: float) -> None:
+        """What it has of its own goes on, as the particles have: a field, once in a substep.
+
+        ``apply`` may be called at any time, and leaves that as it is.
+        """
+
     def follow(self, state: Any, damps: bool) -> None:
         """Add (df/dv) u, by which the force differs where the velocity is u ahead.
 

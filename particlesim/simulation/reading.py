@@ -21,6 +21,7 @@ from ..instruments.ledger.ledger import Ledger, read
 from ..instruments.stability import Stability, stability
 from ..instruments.watchdog.incident import Incident
 from ..instruments.watchdog.watch import Watchdog
+from ..interactions.fields.field_force import FieldForce
 from ..interactions.fluid.interpolation import interpolate
 from ..interactions.fluid.sph import SPH
 from ..output import checkpoint
@@ -98,6 +99,14 @@ class Reading(Access):
     def world(self, index: int) -> World:
         """A view of one world."""
         return World(self.loop, self.writer, index)
+
+    def field(self, part: FieldForce) -> np.ndarray:
+        """The field of a :class:`~particlesim.FieldForce` at the nodes of its grid, (x, y, z).
+
+        Args:
+            part: Of the scene of a world, whose field it is.
+        """
+        return self.loop.bound("Simulation.field", part).read_field(part)
 
     def force(self, constraint: ConstraintBase) -> np.ndarray:
         """Estimated force on the end that feels most of each tuple, |lam| |grad C| / dt^2 [force].

@@ -81,6 +81,19 @@ def few_forces(periodic, count):
     return scene
 
 
+def charged():
+    """Kinds, pairs that are left out, an Ewald sum and fields."""
+    scene = particles(periodic=BOX)
+    more = scene.add_particles([(1, 1, 1)], group="more")
+    kinds = [scene.groups[0], more]
+    pairs = ps.LennardJones(kinds, sigma=[1.0, 0.8], truncation="xplor", exclude=[(0, 1)])
+    scene.add_interaction(pairs)
+    scene.add_interaction(ps.Electrostatics("ewald", tolerance=1e-2))
+    scene.add_interaction(ps.FieldForce(ps.GridField(*BOX, 1.0, speed=1.0)))
+    scene.add_interaction(ps.FieldForce(ps.PoissonField(*BOX, 1.0), coupling="charge"))
+    return scene
+
+
 def damped():
     scene = particles()
     scene.add_interaction(ps.Springs([(0, 1)], 1.0, 1.0, damping=1.0))
@@ -121,6 +134,7 @@ SCENES = {
     "gas": (lambda: particles(), {}),
     "uncompensated_gas": (lambda: particles(), {"compensated": False}),
     "forces": (forces, {"ledger": True}),
+    "charged": (charged, {}),
     "damped": (damped, VERLET),
     "periodic_forces": (lambda: few_forces(BOX, 600), VERLET | {"compensated": False}),
     "small_periodic_world": (lambda: few_forces(BOX, 20), {}),
@@ -134,7 +148,8 @@ SCENES = {
 }  # fmt: skip
 
 EVERY_KERNEL = (
-    "forces", "damped", "periodic_forces", "fluid", "constraints", "breaking", "star_collision"
+    "forces", "charged", "damped", "periodic_forces", "fluid", "constraints", "breaking",
+    "star_collision",
 )  # fmt: skip
 
 

@@ -1,0 +1,1 @@
+"""Fields that particles act on, and that act on them."""
