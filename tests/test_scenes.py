@@ -31,7 +31,7 @@ def simulate(name, frames, device, settings=None, **options):
 def test_the_ready_scenes_are_all_there():
     expected = (
         "bouncing_block chain dam_break freezing gas_in_a_box pile spring_lattice star_collision "
-        "three_body triple_pendulum"
+        "three_body triple_pendulum wave_field"
     )
     assert set(expected.split()) <= set(NAMES)
 
