@@ -26,6 +26,7 @@ from .interactions.fields.wave import GridField
 from .interactions.fluid.equations_of_state import EquationOfState, Polytrope, Tait
 from .interactions.fluid.sph import SPH
 from .interactions.fluid.viscosities import ArtificialViscosity, Viscosity
+from .interactions.grains import HertzianGrains
 from .interactions.gravity import Gravity
 from .interactions.pair_laws import PairForce, PairPotential
 from .interactions.pair_sum import PairSum
@@ -68,6 +69,7 @@ __all__ = [
     "Gravity",
     "GridField",
     "Group",
+    "HertzianGrains",
     "History",
     "Incident",
     "Integrator",
