@@ -21,6 +21,7 @@ import numpy as np
 import warp as wp
 
 from .choices import derivable, passed, taken
+from .exponential import exponential
 from .extremes import larger, smaller, within
 from .warp_internals import compiled, digest, is_after_gradients, named_function
 
@@ -31,8 +32,8 @@ _DOUBLE = {
 }
 _VECTORS = (*_DOUBLE.values(), *(getattr(wp, name) for name in _DOUBLE))
 _DOUBLE["float32"] = wp.float64
-# What laws call in place of Warp's own, so that their derivatives vectorise.
-_EXTREMES = {"max": larger, "min": smaller, "clamp": within}
+# What laws call in place of Warp's own, so that they and their derivatives vectorise.
+_EXTREMES = {"max": larger, "min": smaller, "clamp": within, "exp": exponential}
 _CHOICES = {"taken": taken, "passed": passed}
 
 
@@ -211,14 +212,19 @@ def function(func: Callable[..., Any], after_gradients: bool = False) -> wp.Func
     return named_function(func, name, after_gradients=after_gradients)
 
 
-def native(stub: Callable[..., Any], snippet: str, after_gradients: bool = True) -> wp.Function:
+def native(
+    stub: Callable[..., Any], snippet: str, after_gradients: bool = True,
+    adjoint: str | None = None,
+) -> wp.Function:  # fmt: skip
     """A function whose body is C++, named after its content like :func:`function`.
 
     The stub calls the functions that the snippet calls by name: Warp then emits them before it.
-    With ``after_gradients`` they may be derived laws.
+    With ``after_gradients`` they may be derived laws. ``adjoint`` is the body of its derivative.
     """
     name = f"{stub.__name__}_{digest(snippet, *stub.__annotations__.values())}"
-    return named_function(stub, name, snippet=snippet, after_gradients=after_gradients)
+    return named_function(
+        stub, name, snippet=snippet, adjoint=adjoint, after_gradients=after_gradients
+    )
 
 
 def function_from_source(

@@ -32,6 +32,7 @@ def named_function(
     annotations: Mapping[str, Any] | None = None,
     source: str | None = None,
     snippet: str | None = None,
+    adjoint: str | None = None,
     after_gradients: bool = False,
 ) -> wp.Function:
     """The Warp function of that name in native code, the same one for the same name.
@@ -53,7 +54,7 @@ def named_function(
         name: Name in native code. It must tell apart what differs, as a hash of the content does.
         annotations: Types of the arguments, in place of those written.
         source: What Warp reads in place of the function's own source.
-        snippet: C++ in place of a body.
+        snippet: C++ in place of a body. adjoint: And of its derivative.
         after_gradients: Emitted with the functions that use ``wp.grad``, behind the adjoints that
             those call: needed by whoever calls one of them by name.
     """
@@ -63,7 +64,8 @@ def named_function(
             source = "@wp.func_native()\n" + textwrap.dedent(inspect.getsource(func))
         made = wp.Function(
             func, key=func.__name__, namespace="", native_func=name, native_snippet=snippet,
-            module=wp.get_module(func.__module__), overloaded_annotations=annotations,
+            adj_native_snippet=adjoint, module=wp.get_module(func.__module__),
+            overloaded_annotations=annotations,
             source=source,
         )  # fmt: skip
         made.adj.uses_grad_call = after_gradients

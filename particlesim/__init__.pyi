@@ -47,6 +47,7 @@ from .scene.law import Law, law
 from .scene.part import ConstraintBase, Interaction
 from .scene.scene import Scene
 from .scene.settings import Settings
+from .scene.table import Table
 from .simulation.simulation import Simulation
 
 __all__ = [
@@ -100,6 +101,7 @@ __all__ = [
     "StabilityWarning",
     "Stress",
     "Surface",
+    "Table",
     "Tait",
     "Tradeoff",
     "Tuned",

@@ -98,8 +98,9 @@ class HertzianGrains(Interaction):
         sliding: gamma [time], at least 0: how long a slow slide lasts, by the normal stiffness.
 
     Example:
-        >>> HertzianGrains(modulus=1e6, ratio=0.3, dissipation=1e-4).parameters["stiffness"].round()
-        732601.0
+        >>> grains = HertzianGrains(modulus=1e6, ratio=0.3, dissipation=1e-4)
+        >>> round(grains.parameters["stiffness"])
+        732601
     """
 
     def __init__(
@@ -111,7 +112,7 @@ class HertzianGrains(Interaction):
         ratio = validate.number(name, "ratio", ratio, above=-1.0, maximum=0.5)
         self.group = group
         self.parameters = {
-            "stiffness": np.float64(2.0 / 3.0 * modulus / (1.0 - ratio**2)),
+            "stiffness": 2.0 / 3.0 * modulus / (1.0 - ratio**2),
             "dissipation": validate.number(name, "dissipation", dissipation, minimum=0.0),
             "sliding": validate.number(name, "sliding", sliding, minimum=0.0),
             "friction": validate.number(name, "friction", friction, minimum=0.0),

@@ -190,3 +190,20 @@ def test_what_holds_particles_together_is_left_out():
 def test_what_does_not_fit_is_refused(part, message):
     with pytest.raises(ValueError, match=message):
         simulate(liquid(part))
+
+
+def test_laws_take_whole_numbers(precision):
+    """Attributes that are whole, and loops whose rounds are known."""
+
+    @ps.law
+    def by_type(r: float, type_i: int, type_j: int, strength: float):
+        total = float(0.0)
+        for n in range(3):
+            total += float(n) * r
+        return wp.where(type_i == type_j, strength, 2.0 * strength) * total
+
+    scene = ps.Scene()
+    scene.add_particles([(0, 0, 0), (0.7, 0, 0), (0, 0.5, 0)], type=[0, 1, 1])
+    scene.add_interaction(ps.PairPotential(by_type, cutoff=0.8, strength=3.0))
+    sim = simulate(scene, precision=precision)
+    np.testing.assert_allclose(sim.get("force")[0], [18.0, 18.0, 0.0], rtol=1e-6)

@@ -88,7 +88,7 @@ class Arguments:
     def _check_type(self, parameter: str, width: int | None) -> None:
         """The parameter is of that width; None: a number."""
         kind = self.law.parameters[parameter]
-        number, vector = kind in NUMBERS, WIDTHS.get(kind)
+        number, vector = kind in NUMBERS or kind is int, WIDTHS.get(kind)
         if (width is None and vector) or (width is not None and number):
             wanted = "float" if width is None else f"wp.vec{width}"
             raise validate.fail(
@@ -110,14 +110,16 @@ class Arguments:
             read: How an array is read, of its name and an index.
         """
         text = []
-        for kind, name in self.sources:
+        for parameter, (kind, name) in zip(self.names, self.sources, strict=True):
             if kind == "parameter":
                 text.append(f"p.{name}")
             elif kind == "extra":
                 text.append((extra or {})[name])
             else:
                 field = "x" if name == "position" else name
-                text.append(read.format(field, index[kind.removeprefix("quantity")]))
+                value = read.format(field, index[kind.removeprefix("quantity")])
+                # Arrays hold no whole numbers, but such as are whole.
+                text.append(f"int({value})" if self.law.parameters[parameter] is int else value)
         return text
 
     def value(self, name: str, value: Any) -> Any:
