@@ -14,7 +14,7 @@ from .constraints.contact import Contact
 from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
 from .engine.execution.launch import launch
-from .engine.integrators import Integrator
+from .engine.integrators.integrator import Integrator
 from .instruments.ledger.ledger import Ledger
 from .instruments.profile import Profile
 from .instruments.stability import Stability, StabilityWarning

@@ -17,7 +17,7 @@ from ..scene.scene import Scene
 from ..scene.settings import Settings
 from .execution.acting import act
 from .execution.launch import owner
-from .integrators import method
+from .integrators import Integrator, method
 from .model import Model
 from .neighbors.lists import Neighbors
 from .observers import FINISH, FOLLOW, FORCE, PROJECT, Observers
@@ -56,14 +56,10 @@ class Loop:
             part.prepare(model, self.neighbors)
         required = frozenset[str]().union(*(part.requires for part in self.parts))
         moves = method(settings)
-        if self.constraints and moves.carries_forces:
-            raise validate.fail(
-                "Settings", "integrator", "be symplectic_euler in a scene with constraints",
-                settings.plain["integrator"], "or leave the constraints out",
-            )  # fmt: skip
         for part in self.interactions:
             if part.reads_velocity is None:
                 part.reads_velocity = _names_velocity(type(part))
+        self._check_takes(moves)
         self.implicit = [part for part in self.interactions if part.implicit]
         self.state.require({"position", "velocity"} | required)
         self.integrator = moves(
@@ -81,6 +77,11 @@ class Loop:
         self.unknown_forces = set(range(model.world_count))
 
     def substep(self, dt: float) -> None:
+        """Advance by ``dt``, in the stages of the integrator: mostly one."""
+        for weight in self.integrator.stages:
+            self.stage(weight * dt)
+
+    def stage(self, dt: float) -> None:
         """Advance by ``dt``: interactions, integration, constraints, velocities."""
         self.observers.begin(dt)
         act(self.integrator, self.integrator.begin, dt)
@@ -129,6 +130,22 @@ class Loop:
         for _ in range(iterations):
             for constraint in self.constraints:
                 self.observers.act(constraint, PROJECT, constraint.project, *now)
+
+    def _check_takes(self, moves: type[Integrator]) -> None:
+        """Refuse what the integrator cannot move."""
+        given, back = self.settings.plain["integrator"], min(moves.stages) < 0
+        if self.constraints and (moves.carries_forces or len(moves.stages) > 1):
+            raise validate.fail(
+                "Settings", "integrator", "be symplectic_euler in a scene with constraints", given,
+                "or leave the constraints out",
+            )  # fmt: skip
+        for part in self.interactions if back else ():
+            if part.depends_on_velocity:
+                raise validate.fail(
+                    "Settings", "integrator", f"be velocity_verlet or symplectic_euler with "
+                    f"{part.name}, which depends on velocities: its stages go back in time", given,
+                    "or leave that out",
+                )  # fmt: skip
 
     # Outside a substep ------------------------------------------------------------------------
 

@@ -161,6 +161,11 @@ class Interaction(Part):
     # has ``follow``.
     implicit: bool = False
 
+    @property
+    def depends_on_velocity(self) -> bool:
+        """Whether its force does in any world; a method that goes back in time cannot take it."""
+        return self.implicit or bool(self.reads_velocity)
+
     def apply(self, state: Any, neighbors: Any, dt: float) -> None:
         """Add forces."""
         raise validate.undefined(self, "apply(self, state, neighbors, dt)")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..engine.frames import Frames
-from ..engine.integrators import Integrator
+from ..engine.integrators.integrator import Integrator
 from ..engine.loop import Loop
 from ..engine.model import Model
 from ..engine.neighbors.lists import Neighbors
