@@ -28,6 +28,8 @@ from .interactions.pair import PairForce, PairPotential
 from .interactions.pair_sum import PairSum
 from .interactions.particle import ConstantForce, Drag, ParticleForce, UniformGravity
 from .interactions.springs import Springs
+from .interactions.thermostats.langevin import Langevin
+from .interactions.thermostats.velocity_rescaling import VelocityRescaling
 from .output.history.writer import History, read_history
 from .output.surface import Surface
 from .output.usd.recorder import UsdRecorder
@@ -35,7 +37,7 @@ from .pictures.render.camera import Camera
 from .scene import __version__, sample
 from .scene.group import Group
 from .scene.law import Law, law
-from .scene.part import ConstraintBase, Interaction
+from .scene.part import ConstraintBase, Interaction, Thermostat
 from .scene.scene import Scene
 from .scene.settings import Settings
 from .simulation.simulation import Simulation
@@ -60,6 +62,7 @@ __all__ = [
     "Incident",
     "Integrator",
     "Interaction",
+    "Langevin",
     "Law",
     "Ledger",
     "LennardJones",
@@ -83,10 +86,12 @@ __all__ = [
     "Stress",
     "Surface",
     "Tait",
+    "Thermostat",
     "Tradeoff",
     "Tuned",
     "UniformGravity",
     "UsdRecorder",
+    "VelocityRescaling",
     "Viscosity",
     "__version__",
     "launch",

@@ -12,7 +12,7 @@ import warp as wp
 
 from .. import validate
 from ..scene.fingerprint import laws_of
-from ..scene.part import ConstraintBase, Interaction, Part
+from ..scene.part import ConstraintBase, Interaction, Part, Thermostat
 from ..scene.scene import Scene
 from ..scene.settings import Settings
 from .execution.acting import act
@@ -20,7 +20,7 @@ from .execution.launch import owner
 from .integrators import Integrator, method
 from .model import Model
 from .neighbors.lists import Neighbors
-from .observers import FINISH, FOLLOW, FORCE, PROJECT, Observers
+from .observers import EXCHANGE, FINISH, FOLLOW, FORCE, PROJECT, Observers
 from .state import State
 
 LEFT_BY_FORCES = ("force", "density", "pressure")
@@ -51,6 +51,7 @@ class Loop:
         # What is prepared allocates only what it requires.
         self.interactions: Sequence[Interaction] = _bound([each.interactions for each in scenes])
         self.constraints: Sequence[ConstraintBase] = _bound([each.constraints for each in scenes])
+        self.thermostats: Sequence[Thermostat] = _bound([each.thermostats for each in scenes])
         self.state, self.neighbors = State(model), Neighbors(model)
         for part in self.parts:
             part.prepare(model, self.neighbors)
@@ -67,6 +68,8 @@ class Loop:
             remember="previous_position" in required, implicit=bool(self.implicit),
             predicted=any(part.reads_velocity for part in self.interactions),
         )  # fmt: skip
+        if self.thermostats:
+            self.integrator.exchange = self.exchange
         self.neighbors.allocate(self.state)
         for part in self.parts:
             part.attach(model, self.state)
@@ -94,6 +97,11 @@ class Loop:
         for constraint in self.constraints:
             self.observers.act(constraint, FINISH, constraint.finish, *now)
         self.observers.end(dt)
+
+    def exchange(self, dt: float) -> None:
+        """Thermostats change velocities, in the middle of a drift of ``dt``."""
+        for thermostat in self.thermostats:
+            self.observers.act(thermostat, EXCHANGE, thermostat.exchange, self.state, dt)
 
     def forces(self, dt: float) -> None:
         """Interactions add forces at the present positions."""
@@ -139,13 +147,13 @@ class Loop:
                 "Settings", "integrator", "be symplectic_euler in a scene with constraints", given,
                 "or leave the constraints out",
             )  # fmt: skip
-        for part in self.interactions if back else ():
-            if part.depends_on_velocity:
-                raise validate.fail(
-                    "Settings", "integrator", f"be velocity_verlet or symplectic_euler with "
-                    f"{part.name}, which depends on velocities: its stages go back in time", given,
-                    "or leave that out",
-                )  # fmt: skip
+        on_velocity = [part for part in self.interactions if part.depends_on_velocity]
+        for part in [*on_velocity, *self.thermostats] if back else ():
+            raise validate.fail(
+                "Settings", "integrator", f"be velocity_verlet or symplectic_euler with "
+                f"{part.name}, which depends on velocities: its stages go back in time", given,
+                "or leave that out",
+            )  # fmt: skip
 
     # Outside a substep ------------------------------------------------------------------------
 
@@ -187,14 +195,15 @@ class Loop:
         return sum(scene.changes for scene in self._distinct)
 
     @property
-    def parts(self) -> list[Interaction | ConstraintBase]:
-        """All interactions, then all constraints."""
-        return [*self.interactions, *self.constraints]
+    def parts(self) -> list[Interaction | ConstraintBase | Thermostat]:
+        """All interactions, then all constraints, then all thermostats."""
+        return [*self.interactions, *self.constraints, *self.thermostats]
 
     @property
     def actors(self) -> list[Any]:
         """Who acts in a substep."""
-        return [*self.passes, *self.constraints, self.integrator, *self.observers.all]
+        acting = [*self.passes, *self.constraints, *self.thermostats]
+        return [*acting, self.integrator, *self.observers.all]
 
     def bound(self, owner: str, part: Part) -> Any:
         """The copy of a scene's part that is in motion here.

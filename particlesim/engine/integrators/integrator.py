@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from ... import validate
 from ...kernels.engine.implicit import implicit_kernels
 from ...kernels.engine.integrate import motion_type
-from ...kernels.engine.motion_kernels import integration_kernels, tick_kernel
+from ...kernels.engine.motion_kernels import go_on_kernel, integration_kernels, tick_kernel
 from ..execution.launch import launch
 from ..limit import explicit_step
 from ..model import Model
@@ -65,6 +66,7 @@ class Integrator:
         return self.order > 1
 
     host = False  # whether it works in Python, and so has to be called in every substep
+    exchange: Callable[[float], None] | None = None  # has thermostats act; None: there are none
 
     def __init__(
         self, model: Model, state: State, *, constrained: bool = False, remember: bool = False,
@@ -99,6 +101,7 @@ class Integrator:
             model.precision, model.periodic, forces, settings.compensated, constrained, remember,
             model.vectorised,
         )  # fmt: skip
+        self.go_on = go_on_kernel(model.precision, model.periodic, settings.compensated, remember)
         self.motion = _motion(model, state)
 
     @property
@@ -159,11 +162,24 @@ class Integrator:
         self.move(0.0, dt)
 
     def move(self, kick: float, drift: float) -> None:
-        """v += w f kick; x += v drift, in one launch. The clock goes with the positions."""
-        self._launch_blocks(self.kernels.advance, kick, drift)
+        """v += w f kick; x += v drift, in one launch. The clock goes with the positions.
+
+        Thermostats, where there are any, act in the middle of the drift.
+        """
+        if self.exchange is None:
+            self._launch_blocks(self.kernels.advance, kick, drift)
+            self._tick(drift)
+            return
+        self._launch_blocks(self.kernels.advance, kick, 0.5 * drift)
+        self._tick(0.5 * drift)
+        self.exchange(drift)
+        self._launch(self.go_on, 0.5 * drift)
+        self._tick(0.5 * drift)
+
+    def _tick(self, dt: float) -> None:
         if "time" in self.state:
             model = self.model
-            launch(tick_kernel(), model.world_count, [drift, self.state.time], model.device)
+            launch(tick_kernel(), model.world_count, [dt, self.state.time], model.device)
 
     def _launch_blocks(self, kernel: Any, *scalars: float) -> None:
         inputs, block = [*scalars, self.motion], self.kernels.block
