@@ -26,7 +26,7 @@ from ..interactions.fluid.sph import SPH
 from ..output import checkpoint
 from ..pictures.render.camera import Camera
 from ..pictures.render.image import Image
-from ..scene.part import ConstraintBase, Interaction
+from ..scene.part import ConstraintBase, Interaction, Thermostat
 from ..scene.scene import Scene
 from ..scene.settings import Settings
 from .access import Access, World, Writer
@@ -52,6 +52,7 @@ class Reading(Access):
     neighbors: Neighbors
     interactions: Sequence[Interaction]
     constraints: Sequence[ConstraintBase]
+    thermostats: Sequence[Thermostat]
     integrator: Integrator
 
     def _show(self, loop: Loop) -> None:
@@ -60,6 +61,7 @@ class Reading(Access):
         self.model, self.device, self.state = loop.model, loop.model.device, loop.state
         self.neighbors, self.integrator = loop.neighbors, loop.integrator
         self.interactions, self.constraints = loop.interactions, loop.constraints
+        self.thermostats = loop.thermostats
 
     @property
     def incidents(self) -> list[Incident]:

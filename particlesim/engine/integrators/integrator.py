@@ -20,7 +20,8 @@ class Integrator:
 
     A substep of ``dt`` is ``begin``; the interactions' forces at the positions that it leaves;
     ``advance``; the constraints; ``finish``. A member says what happens in ``begin`` and
-    ``advance``, made of :meth:`kick`, :meth:`drift` and :meth:`move`. Its class is given to the
+    ``advance``, made of :meth:`kick`, :meth:`drift` and :meth:`move`; thermostats act in the middle
+    of every drift. Its class is given to the
     settings, ``Settings(integrator=YourClass)``, and ``model`` and ``state`` are there to be read.
 
     A method of several evaluations of the forces names its ``stages``: all of that is done once for

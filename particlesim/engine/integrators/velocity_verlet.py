@@ -9,6 +9,8 @@ from .integrator import Integrator
 class VelocityVerlet(Integrator):
     """Kick dt/2, drift dt, forces, kick dt/2 (Swope et al. 1982, eq. 9). Second order.
 
+    With :class:`~particlesim.Langevin` in the middle of the drift it is BAOAB.
+
     One evaluation of the forces a substep: the first kick uses those of the last substep. Forces
     between particles that depend on velocities, as of dampers and viscosity, and those of one's own
     see what the last substep's forces would make of them by its end, v + w f dt, which is of second

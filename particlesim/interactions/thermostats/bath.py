@@ -68,6 +68,7 @@ class Bath(Thermostat):
                       for peer in self.peers])
             for name in ("times", "temperatures")
         )  # fmt: skip
+        model.fits(self.name, {"temperature": values})
         seeds = np.array([peer.seed for peer in self.peers], dtype=np.uint64)
         keys = np.stack([seeds & np.uint64(2**32 - 1), seeds >> np.uint64(32)], axis=1)
         worlds, first = model.world_count, model.scenes[0].thermostats
@@ -99,7 +100,7 @@ class Bath(Thermostat):
 
 def ramp(owner: str, temperature: Any) -> tuple[np.ndarray, np.ndarray]:
     """Times and temperatures of a number, or of a pair (times, temperatures)."""
-    if not isinstance(temperature, tuple | list | np.ndarray):
+    if not isinstance(temperature, tuple | list) and np.ndim(temperature) == 0:
         value = validate.number(owner, "temperature", temperature, minimum=0.0, unit="energy")
         return np.zeros(1), np.array([value])
     if len(temperature) != 2 or not 1 <= np.size(temperature[0]) == np.size(temperature[1]):

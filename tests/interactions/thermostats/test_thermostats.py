@@ -157,6 +157,8 @@ def test_refused(refused):
         ps.Langevin(temperature=1.0, friction=1.0, seed=0.5)
     with refused("VelocityRescaling: relaxation_time must be above 0"):
         ps.VelocityRescaling(temperature=1.0, relaxation_time=0.0)
+    with refused("Langevin: temperature must"):
+        simulate(scene(temperature=1e300))
     with refused("integrator must be velocity_verlet or symplectic_euler with Langevin"):
         simulate(scene(), integrator="yoshida4")
     with refused("thermostat must be new to the scene"):
