@@ -1,6 +1,6 @@
 """Random numbers by counting: each is a function of a key and a counter, and of nothing else.
 
-Philox4x32-10 (Salmon, Moraes, Dror and Shaw 2011, sec. 3.3). Whoever draws counts by what is his
+Philox4x32-10 (Salmon, Moraes, Dror and Shaw 2011). Whoever draws counts by what is his
 own, as the number of a particle and that of a substep, so that the numbers do not depend on
 threads, on worlds beside or on where a run was begun.
 """
@@ -62,7 +62,7 @@ def normal_function(precision: Precision) -> wp.Function:
 def gamma_function(precision: Precision) -> wp.Function:
     """``gamma(shape, counter, key) -> g``: of the gamma distribution of that shape, at least 1.
 
-    (Marsaglia and Tsang 2000, sec. 3.) Of some twenty draws that are refused, each with a
+    (Marsaglia and Tsang 2000.) Of some twenty draws that are refused, each with a
     probability under 5 %, the last one stands. The counter's last number is counted on.
     """
     real = precision.scalar

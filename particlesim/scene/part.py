@@ -118,7 +118,8 @@ class Interaction(Part):
     lists, up to date for it. ``parameters``, where there are any, is a dict of numbers and
     3-vectors that may differ from world to world. ``cutoff`` is the distance within which
     neighbours are looked for; None: all pairs of a world. ``reads_velocity`` says that ``apply``
-    reads velocities, which velocity Verlet then predicts; None: if the class's source names them.
+    reads velocities, which velocity Verlet then predicts, and methods of which stages go back in
+    time refuse; None: if the class's source names them.
 
     ``apply`` is recorded once and replayed in every substep: ``wp.launch``, ``wp.copy``, ``zero_``
     and ``fill_`` are, with the numbers and arrays that they are given then, and so is

@@ -73,8 +73,7 @@ def test_the_limit_is_where_the_transfer_matrix_leaves_the_unit_circle(method):
     below = max(largest(theta) for theta in np.linspace(0.01, phase * (1 - 1e-9), 1000))
     # A double eigenvalue is resolved to the root of the rounding of the entries, 1e-15.
     assert below < 1 + 1e-7 and largest(phase * 1.001) > 1.001
-    if method == "yoshida4":  # McLachlan and Gray (1997), table 5, give 1.573
-        assert phase == pytest.approx(1.573, abs=5e-4)
+    assert phase == pytest.approx({"yoshida4": 1.573, "yoshida6": 2.269}[method], abs=5e-4)
 
 
 @pytest.mark.parametrize("method", COMPOSED)

@@ -11,7 +11,7 @@ class Composition(VelocityVerlet):
 
     Where the w are the same from either end and their cubes add up to 0, errors of third order
     cancel, and those of even order are none: the order is 4, and more with more conditions
-    (Yoshida 1990, sec. 3 and 4). One evaluation of the forces a stage: each starts from those that
+    (Yoshida 1990). One evaluation of the forces a stage: each starts from those that
     the last has ended with. The map is symplectic and symmetric in time as its stages are.
     """
 

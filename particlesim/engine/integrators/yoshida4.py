@@ -8,7 +8,7 @@ _OUTER = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))  # 2 w_1 + w_0 = 1 and 2 w_1^3 + w_0^3
 
 
 class Yoshida4(Composition):
-    """Velocity Verlet in three stages, w_1, w_0, w_1 (Yoshida 1990, sec. 2; Forest and Ruth 1990).
+    """Velocity Verlet in three stages, w_1, w_0, w_1 (Yoshida 1990; Forest and Ruth 1990).
 
     w_1 = 1 / (2 - 2^(1/3)) = 1.3512, w_0 = 1 - 2 w_1 = -1.7024. Stable up to omega dt = 1.573.
     """

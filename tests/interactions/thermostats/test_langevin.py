@@ -70,7 +70,7 @@ def test_relaxation_is_that_of_ornstein_and_uhlenbeck(substeps):
 def test_positions_of_oscillators_are_exact_at_a_large_step(integrator):
     # omega dt = 1.6, of 2. BAOAB: <x^2> = T / k whatever the step, and <v^2> at the end of a
     # substep T / m (1 - (omega dt)^2 / 4); with whole kicks v is half a step behind, where it is
-    # T / m. (Leimkuhler and Matthews 2013, sec. II; Zhang et al. 2019, sec. III.)
+    # T / m. (Leimkuhler and Matthews 2013; Zhang et al. 2019.)
     omega, phase = 3.0, 1.6
     stiffness = MASS * omega**2
     sim = simulate(
