@@ -114,6 +114,27 @@ def test_heat_is_no_fault(recwarn):
     assert not [each for each in recwarn if issubclass(each.category, UserWarning)]
 
 
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("way", ["freeze", "retry"])
+def test_what_the_watchdog_does_to_one_world_leaves_the_other_alone(way):
+    def trapped(stiffness, seed):
+        built = ps.Scene()
+        atoms = built.add_particles([(0.1, 0, 0), (0, 0.1, 0)])
+        built.add_interaction(ps.ParticleForce(potential=trap, stiffness=stiffness))
+        built.add_thermostat(ps.Langevin(atoms, temperature=1.0, friction=1.0, seed=seed))
+        return built
+
+    # omega dt = 2.8 in the second world: past the limit, and within it by twice the substeps.
+    scenes = [trapped(1.0, 1), trapped(2.8**2 / 0.025**2, 2)]
+    sim = simulate(scenes, on_failure=way)
+    sim.run(12)
+    assert sim.incidents and {each.world for each in sim.incidents} == {1}
+    assert np.isfinite(sim.world(1).velocity).all()
+    alone = simulate(scenes[0])
+    alone.run(12)
+    np.testing.assert_array_equal(sim.world(0).velocity, alone.velocity)
+
+
 class Still(ps.Thermostat):
     """One's own, in NumPy: everything is stopped."""
 
