@@ -6,7 +6,7 @@ ground up, each of which knows only those below it:
     kernels         Warp functions and kernels, by the same subjects
     scene           what there is: particles, abstract parts, laws, settings, samples; NumPy only
     engine          model, state, neighbour lists, the loop, integrators, how frames are run
-    interactions    forces, one file a kind, with what limits its step
+    interactions    forces and heat baths, one file a kind, with what limits its step
     constraints     XPBD, one file a kind, with what limits its step
     instruments     what measures and watches: diagnostics, ledger, watchdog, stability
     output          files: recordings, USD and its tools, histories, surfaces, checkpoints

@@ -14,7 +14,7 @@ from .constraints.contact import Contact
 from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
 from .engine.execution.launch import launch
-from .engine.integrators import Integrator
+from .engine.integrators.integrator import Integrator
 from .instruments.ledger.ledger import Ledger
 from .instruments.profile import Profile
 from .instruments.stability import Stability, StabilityWarning
@@ -37,6 +37,8 @@ from .interactions.potentials.morse import Morse
 from .interactions.potentials.soft_sphere import SoftSphere
 from .interactions.potentials.yukawa import Yukawa
 from .interactions.springs import Springs
+from .interactions.thermostats.langevin import Langevin
+from .interactions.thermostats.velocity_rescaling import VelocityRescaling
 from .output.history.writer import History, read_history
 from .output.surface import Surface
 from .output.usd.recorder import UsdRecorder
@@ -44,7 +46,7 @@ from .pictures.render.camera import Camera
 from .scene import __version__, sample
 from .scene.group import Group
 from .scene.law import Law, law
-from .scene.part import ConstraintBase, Interaction
+from .scene.part import ConstraintBase, Interaction, Thermostat
 from .scene.scene import Scene
 from .scene.settings import Settings
 from .scene.table import Table
@@ -75,6 +77,7 @@ __all__ = [
     "Incident",
     "Integrator",
     "Interaction",
+    "Langevin",
     "Law",
     "Ledger",
     "LennardJones",
@@ -103,10 +106,12 @@ __all__ = [
     "Surface",
     "Table",
     "Tait",
+    "Thermostat",
     "Tradeoff",
     "Tuned",
     "UniformGravity",
     "UsdRecorder",
+    "VelocityRescaling",
     "Viscosity",
     "Yukawa",
     "__version__",

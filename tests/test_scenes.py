@@ -16,6 +16,8 @@ SMALL = {
     "dam_break": {"spacing": 0.05},
     "star_collision": {"count": 150},
     "freezing": {"cells": 5},
+    "lj_melt": {"cells": 4},
+    "phase_transition": {"cells": 4},
     "gas_in_a_box": {"count": 400},
 }
 
@@ -30,8 +32,8 @@ def simulate(name, frames, device, settings=None, **options):
 
 def test_the_ready_scenes_are_all_there():
     expected = (
-        "bouncing_block chain dam_break freezing gas_in_a_box pile spring_lattice star_collision "
-        "three_body triple_pendulum wave_field"
+        "bouncing_block chain dam_break freezing gas_in_a_box lj_melt phase_transition pile "
+        "spring_lattice star_collision three_body triple_pendulum wave_field"
     )
     assert set(expected.split()) <= set(NAMES)
 
@@ -86,6 +88,47 @@ def test_fluid_freezes(device):
     # Close packing has 12 nearest neighbours; defects and grain boundaries keep the mean below.
     assert 11.5 < neighbors.mean() < 12.5
     assert 2 * sim.diagnostics().kinetic[0] / (3 * sim.particle_count) < 0.4
+
+
+@pytest.mark.slow
+def test_the_melt_is_that_of_lammps(device):
+    module, sim = simulate("lj_melt", 0, device, cells=8)
+    found, n = sim.diagnostics(), sim.particle_count
+    assert found.potential[0] / n == pytest.approx(module.ENERGY, rel=1e-6)
+    assert 2 * found.kinetic[0] / (3 * n - 3) == pytest.approx(1.44, rel=1e-6)
+    sim.run(20)
+    # LAMMPS' own energies after 100, 200, 300 and 400 steps differ by up to 3e-4 for 32 000 atoms,
+    # as atoms cross the cutoff at random: 16 times fewer differ by up to 4 times that.
+    assert module.error(sim) < 1.2e-3
+
+
+@pytest.mark.slow
+def test_a_crystal_melts_and_freezes(device):
+    module, sim = simulate("phase_transition", 0, device, cells=5)
+    rows = []
+    for _ in range(module.frames):
+        sim.step()
+        rows.append((*module.caloric(sim), module.order(sim)))
+    bath, temperature, energy, order = np.array(rows).T
+    time = module.settings.dt * (1 + np.arange(len(bath)))
+    up, down = time < 60, time > 90
+    # Canonical: 1497 degrees of freedom have a spread of sqrt(2 / 1497) = 3.7 % of T.
+    off = temperature / bath - 1
+    assert abs(off.mean()) < 4 * 0.037 / np.sqrt(len(bath)) and 0.03 < off.std() < 0.045
+    # Dulong and Petit: 3 an atom. Springs that soften take some off, and the energies of 40 frames
+    # scatter by 3 T / sqrt(1497) = 0.04 about a line over 0.7: 0.03 of its slope.
+    cold = up & (bath < 1.0)
+    assert np.polyfit(bath[cold], energy[cold], 1)[0] == pytest.approx(3, abs=0.3)
+    # The crystal is there while it is heated past where the liquid is on its way down, and the
+    # latent heat is between them.
+    assert order[up & (bath < 1.5)].min() > 0.6 and order[down].max() < 0.4
+    warm = down & (bath < 0.9) & (bath > 0.85)
+    crystal = np.interp(0.87, bath[cold], energy[cold])
+    assert energy[warm].mean() > crystal + 0.5
+    # Where it freezes, within a tenth of the temperature, it falls by more than it does by cold.
+    frozen = down & (bath < 0.4) & (bath > 0.35)
+    line = energy[warm].mean() - 3.0 * (0.875 - 0.375)
+    assert energy[frozen].mean() < line - 0.2
 
 
 @pytest.mark.slow

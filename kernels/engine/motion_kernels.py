@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from ..precision import Precision, register
-from .integrate import motion_functions, motion_type, plain_rows
+from .integrate import motion_functions, motion_type, plain_rows, wrap_function
 from .loops import Periodicity
 from .native_motion import BLOCK, native_rows
 
@@ -65,6 +65,26 @@ def integration_kernels(
         advance=advance, kick_only=kick_only, foresee=foresee, go_back=go_back,
         follow_corrections=follow_corrections, block=block,
     )  # fmt: skip
+
+
+@functools.cache
+def go_on_kernel(
+    precision: Precision, periodic: Periodicity, compensated: bool, remember: bool
+) -> wp.Kernel:
+    """Kernel: x += v dt, the second part of a drift that something was done in the middle of."""
+    real, Motion = precision.scalar, motion_type(precision)
+    _, move = motion_functions(precision, False, compensated)
+    wrap = wrap_function(move, precision, compensated, remember)
+    wraps = bool(periodic)
+
+    @register
+    def go_on(first: int, dt: real, m: Motion):
+        i = first + wp.tid()
+        move(i, m.v[i] * dt, m)
+        if wp.static(wraps):
+            wrap(i, m)
+
+    return go_on
 
 
 @functools.cache

@@ -53,6 +53,10 @@ class ConstraintForce(Interaction):
             )  # fmt: skip
 
     @property
+    def depends_on_velocity(self) -> bool:
+        return bool(self.tuples.damped)
+
+    @property
     def name(self) -> str:
         return f"{self.constraint.name} as a force"
 

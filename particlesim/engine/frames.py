@@ -10,7 +10,6 @@ import warp as wp
 
 from .. import validate
 from ..kernels.instruments.watchdog import peak_kernel
-from ..scene.part import Interaction
 from ..scene.settings import Settings
 from .execution.acting import record_acts
 from .execution.executors import Executor
@@ -134,16 +133,26 @@ class Frames:
     def _refuse_idle(self, substep: Program) -> None:
         """Of a part of one's own nothing was recorded: what it does it has done once and for all.
 
-        Ready parts know where there is nothing to do for them.
+        Ready parts know where there is nothing to do for them. Thermostats are asked by what moves.
         """
-        parts: list[Any] = [*self.loop.passes, *self.loop.constraints]
-        for part in parts:
-            method = part.apply if isinstance(part, Interaction) else part.project
+        loop = self.loop
+        methods: list[tuple[Any, Callable[..., None]]]
+        methods = [(part, part.apply) for part in loop.passes]
+        methods += [(part, part.project) for part in loop.constraints]
+        methods += [(part, part.exchange) for part in loop.thermostats]
+        for part, method in methods:
             ready = method.__module__.partition(".")[0] == __name__.partition(".")[0]
             if id(part) not in substep.acted and not ready and self._has_members(part):
                 raise validate.fail(
                     part.name, method.__name__, "launch something whenever it is called", None,
                     "use ps.launch or wp.launch, or set host = True where it works in NumPy",
+                )  # fmt: skip
+
+        for part in loop.thermostats:
+            if id(part) not in substep.acted and self._has_members(part):
+                raise validate.fail(
+                    loop.integrator.name, "advance", f"drift by drift or move, where {part.name} "
+                    "acts", None, "use these, or leave the thermostat out",
                 )  # fmt: skip
 
     def _has_members(self, part: Any) -> bool:

@@ -12,15 +12,15 @@ import warp as wp
 
 from .. import validate
 from ..scene.fingerprint import laws_of
-from ..scene.part import ConstraintBase, Interaction, Part
+from ..scene.part import ConstraintBase, Interaction, Part, Thermostat
 from ..scene.scene import Scene
 from ..scene.settings import Settings
 from .execution.acting import act
 from .execution.launch import owner
-from .integrators import method
+from .integrators import Integrator, method
 from .model import Model
 from .neighbors.lists import Neighbors
-from .observers import FINISH, FOLLOW, FORCE, PROJECT, Observers
+from .observers import EXCHANGE, FINISH, FOLLOW, FORCE, PROJECT, Observers
 from .state import State
 
 LEFT_BY_FORCES = ("force", "density", "pressure")
@@ -51,19 +51,16 @@ class Loop:
         # What is prepared allocates only what it requires.
         self.interactions: Sequence[Interaction] = _bound([each.interactions for each in scenes])
         self.constraints: Sequence[ConstraintBase] = _bound([each.constraints for each in scenes])
+        self.thermostats: Sequence[Thermostat] = _bound([each.thermostats for each in scenes])
         self.state, self.neighbors = State(model), Neighbors(model)
         for part in self.parts:
             part.prepare(model, self.neighbors)
         required = frozenset[str]().union(*(part.requires for part in self.parts))
         moves = method(settings)
-        if self.constraints and moves.carries_forces:
-            raise validate.fail(
-                "Settings", "integrator", "be symplectic_euler in a scene with constraints",
-                settings.plain["integrator"], "or leave the constraints out",
-            )  # fmt: skip
         for part in self.interactions:
             if part.reads_velocity is None:
                 part.reads_velocity = _names_velocity(type(part))
+        self._check_takes(moves)
         self.implicit = [part for part in self.interactions if part.implicit]
         still = Interaction.advance
         self.moving = [part for part in self.interactions if type(part).advance is not still]
@@ -73,6 +70,8 @@ class Loop:
             remember="previous_position" in required, implicit=bool(self.implicit),
             predicted=any(part.reads_velocity for part in self.interactions),
         )  # fmt: skip
+        if self.thermostats:
+            self.integrator.exchange = self.exchange
         self.neighbors.allocate(self.state)
         for part in self.parts:
             part.attach(model, self.state)
@@ -83,6 +82,11 @@ class Loop:
         self.unknown_forces = set(range(model.world_count))
 
     def substep(self, dt: float) -> None:
+        """Advance by ``dt``, in the stages of the integrator: mostly one."""
+        for weight in self.integrator.stages:
+            self.stage(weight * dt)
+
+    def stage(self, dt: float) -> None:
         """Advance by ``dt``: interactions, integration, constraints, velocities."""
         self.observers.begin(dt)
         act(self.integrator, self.integrator.begin, dt)
@@ -98,6 +102,11 @@ class Loop:
         for constraint in self.constraints:
             self.observers.act(constraint, FINISH, constraint.finish, *now)
         self.observers.end(dt)
+
+    def exchange(self, dt: float) -> None:
+        """Thermostats change velocities, in the middle of a drift of ``dt``."""
+        for thermostat in self.thermostats:
+            self.observers.act(thermostat, EXCHANGE, thermostat.exchange, self.state, dt)
 
     def forces(self, dt: float) -> None:
         """Interactions add forces at the present positions."""
@@ -134,6 +143,22 @@ class Loop:
         for _ in range(iterations):
             for constraint in self.constraints:
                 self.observers.act(constraint, PROJECT, constraint.project, *now)
+
+    def _check_takes(self, moves: type[Integrator]) -> None:
+        """Refuse what the integrator cannot move."""
+        given, back = self.settings.plain["integrator"], min(moves.stages) < 0
+        if self.constraints and (moves.carries_forces or len(moves.stages) > 1):
+            raise validate.fail(
+                "Settings", "integrator", "be symplectic_euler in a scene with constraints", given,
+                "or leave the constraints out",
+            )  # fmt: skip
+        on_velocity = [part for part in self.interactions if part.depends_on_velocity]
+        for part in [*on_velocity, *self.thermostats] if back else ():
+            raise validate.fail(
+                "Settings", "integrator", f"be velocity_verlet or symplectic_euler with "
+                f"{part.name}, which depends on velocities: its stages go back in time", given,
+                "or leave that out",
+            )  # fmt: skip
 
     # Outside a substep ------------------------------------------------------------------------
 
@@ -175,14 +200,15 @@ class Loop:
         return sum(scene.changes for scene in self._distinct)
 
     @property
-    def parts(self) -> list[Interaction | ConstraintBase]:
-        """All interactions, then all constraints."""
-        return [*self.interactions, *self.constraints]
+    def parts(self) -> list[Interaction | ConstraintBase | Thermostat]:
+        """All interactions, then all constraints, then all thermostats."""
+        return [*self.interactions, *self.constraints, *self.thermostats]
 
     @property
     def actors(self) -> list[Any]:
         """Who acts in a substep."""
-        return [*self.passes, *self.constraints, self.integrator, *self.observers.all]
+        acting = [*self.passes, *self.constraints, *self.thermostats]
+        return [*acting, self.integrator, *self.observers.all]
 
     def bound(self, owner: str, part: Part) -> Any:
         """The copy of a scene's part that is in motion here.

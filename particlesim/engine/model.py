@@ -53,7 +53,7 @@ def batch(given: Any, worlds: int | None) -> list[Scene]:
         raise validate.fail(owner, "scene", "hold at least one Scene", given, "add a scene")
     first = given[0]
     for w, other in enumerate(given):
-        for what in ("interactions", "constraints"):
+        for what in ("interactions", "constraints", "thermostats"):
             ours = [part.kind() for part in getattr(first, what)]
             theirs = [part.kind() for part in getattr(other, what)]
             if ours != theirs:

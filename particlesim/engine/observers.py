@@ -13,7 +13,8 @@ from .execution.acting import act
 from .execution.launch import owner
 
 # What a part is about to do, or has done.
-FORCE, FOLLOW, PROJECT, FINISH = "force", "follow", "project", "finish"
+FORCE, FOLLOW, EXCHANGE = "force", "follow", "exchange"
+PROJECT, FINISH = "project", "finish"
 
 
 class Observer:

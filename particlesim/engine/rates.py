@@ -11,7 +11,7 @@ import numpy as np
 from .spectrum import Largest
 
 if TYPE_CHECKING:
-    from .integrators import Integrator
+    from .integrators.integrator import Integrator
 
 TURNING = 0.1  # of the largest rate: a smaller imaginary part is rounding
 GROWTH = 20.0  # what pushes along the velocity counts for as much damping: (1 + z)^n is e^(n z)
@@ -68,7 +68,7 @@ class Rates:
         omega, gamma = math.sqrt(self.omega_squared), self.gamma
         dt = integrator.largest_step(self.omega_squared, gamma)
         if not gamma:
-            return "frequency", dt, f"2 / omega, omega = {omega:.4g} /s"
+            return "frequency", dt, f"{omega * dt:.4g} / omega, omega = {omega:.4g} /s"
         if not omega:
             return "damping", dt, f"{gamma * dt:.3g} / gamma, gamma = {gamma:.4g} /s"
         reason = f"omega = {omega:.4g} /s with gamma = {gamma:.4g} /s"

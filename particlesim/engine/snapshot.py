@@ -44,6 +44,7 @@ class Snapshot:
         self._owners: dict[str, Part | Observer] = {
             **{f"interaction_{k}": part for k, part in enumerate(loop.interactions)},
             **{f"constraint_{k}": part for k, part in enumerate(loop.constraints)},
+            **{f"thermostat_{k}": part for k, part in enumerate(loop.thermostats)},
             **{each.name: each for each in loop.observers.all},
         }
         for owner, part in self._owners.items():

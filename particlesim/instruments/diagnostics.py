@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import weakref
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from ..engine.blocks import blocks
 from ..engine.execution.launch import launch
 from ..engine.loop import Loop, Source
 from ..engine.model import Model
@@ -117,7 +117,7 @@ def _measure(sim: Source, forces: Source, potentials: list[np.ndarray] | None) -
             if potentials is not None:
                 own = energy.numpy() - before
                 potentials.append(np.bincount(model.world_of, own, model.world_count))
-    begin, end, world = blocks(model.offsets)
+    begin, end, world = blocks(model.offsets, BLOCK)
     sums = wp.zeros((len(begin), QUANTITIES), dtype=wp.float64, device=device)
     launch(
         block_sums_kernel(model.precision),
@@ -157,14 +157,3 @@ def undisturbed(sim: Source) -> Iterator[None]:
                     wp.copy(now, then)
                 each.mark_all()
                 each.rebuild()
-
-
-def blocks(offsets: np.ndarray, size: int = BLOCK) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Begin, end and world of the blocks; they start anew in each world."""
-    begin, end, world = [], [], []
-    for w, (start, stop) in enumerate(itertools.pairwise(offsets)):
-        edges = np.arange(start, stop, size)
-        begin.append(edges)
-        end.append(np.minimum(edges + size, stop))
-        world.append(np.full(len(edges), w))
-    return np.concatenate(begin), np.concatenate(end), np.concatenate(world)

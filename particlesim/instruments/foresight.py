@@ -9,7 +9,7 @@ On the way goes along what the integrator's modified energy differs from the ene
 which the method conserves, and not the energy (Hairer, Lubich and Wanner 2006, IX.3). For a step h
 
     symplectic Euler    h / 2  F.v
-    velocity Verlet     -h^2 (v.dF/dt / 12 + F.w F / 24)
+    velocity Verlet     -h^2 (v.dF/dt / 12 + F.w F / 24), also as a stage of another method
 """
 
 from __future__ import annotations
@@ -128,7 +128,9 @@ class _Path:
             h = min(2.0 * h, pace, PHASE * self.crossing)
         if self._singular():
             return Ahead(None, math.inf, singular=True)
-        return Ahead(self._told(), self.energies.step(loop.integrator.order))
+        # Stages that are longer than the step ask for a shorter one.
+        kept = self.energies.step(loop.integrator.order) / loop.integrator.reach()
+        return Ahead(self._told(), kept)
 
     def _singular(self) -> bool:
         """Whether steps have shrunk, from the longest before, by more than any orbit asks for."""

@@ -75,6 +75,7 @@ def _of_world(part: Any, probe: Probe, w: int, members: np.ndarray, speed: float
     if not rates[k] > 0:
         return None
     dt = largest_step(r, F[k] / mass[k], speed, explicit_step(rates[k]))
+    dt /= probe.loop.integrator.reach()
     reason = f"two that meet at {speed:.4g} gain {GAIN:.1%} of their energy on average"
     place = probe.place(int(couples[k, 0])) if part.quantities else (w, None)
     return Limit(part.name, "collision", dt, reason, *place)

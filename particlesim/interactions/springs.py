@@ -52,6 +52,10 @@ class Springs(Interaction):
             else topology.per_item(self.name, "rest_length", rest_length, count, minimum=0)
         )
 
+    @property
+    def depends_on_velocity(self) -> bool:
+        return any(peer.damping.any() for peer in self.peers)
+
     def links(self) -> np.ndarray:
         """Pairs to draw, (m, 2) indices in the scene."""
         return self.pairs

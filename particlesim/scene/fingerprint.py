@@ -1,9 +1,9 @@
 """Fingerprints: what of a scene gives the arrays of its simulation their meaning.
 
-Particles, groups, attributes, the periodic box, and of every interaction and constraint its kind,
-its particles, its tuples and the shapes of its parameters, and of every law what it says. Values
-are left out: positions and velocities come with the arrays, and a stiffness may change from one
-part of a run to the next.
+Particles, groups, attributes, the periodic box, and of every part that acts its kind, its
+particles, its tuples and the shapes of its parameters, and of every law what it says. Values are
+left out: positions and velocities come with the arrays, and a stiffness may change from one part of
+a run to the next.
 :func:`values` has them, for runs that are to go on to the same bits.
 """
 
@@ -13,7 +13,7 @@ import dataclasses
 import inspect
 import re
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from inspect import isfunction
 from types import CodeType
 from typing import Any
@@ -102,6 +102,7 @@ def values(scenes: Sequence[Scene]) -> list[dict[str, Any]]:
             "particles": {name: _content(scene.column(name)) for name in sorted(scene.attributes)},
             "interactions": [_contents(part) for part in scene.interactions],
             "constraints": [_contents(part) for part in scene.constraints],
+            **_thermostats(scene, _contents),
         }
         for scene in distinct.values()
     ]
@@ -177,7 +178,14 @@ def _scene(scene: Scene) -> dict[str, Any]:
         "periodic": None if box is None else [box[0].tolist(), box[1].tolist(), list(box[2])],
         "interactions": [_part(scene, part) for part in scene.interactions],
         "constraints": [_part(scene, part) for part in scene.constraints],
+        **_thermostats(scene, lambda part: _part(scene, part)),
     }
+
+
+def _thermostats(scene: Scene, described: Callable[[Part], Any]) -> dict[str, Any]:
+    """Where there are any: descriptions from before there were know nothing of them."""
+    found = [described(part) for part in scene.thermostats]
+    return {"thermostats": found} if found else {}
 
 
 def _part(scene: Scene, part: Part) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What a scene is made of beside particles: interactions and constraints, as abstract parts."""
+"""What a scene is made of beside particles, as abstract parts: what acts on them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .. import validate
 
 
 class Part:
-    """Something that a scene describes and a simulation prepares: interactions and constraints.
+    """Something that a scene describes and a simulation prepares: what acts on particles.
 
     A simulation works on a copy, so that a scene can be simulated many times; ``peers`` are the
     corresponding ones of all worlds. The methods from ``prepare`` on are called by the engine, and
@@ -118,7 +118,8 @@ class Interaction(Part):
     lists, up to date for it. ``parameters``, where there are any, is a dict of numbers and
     3-vectors that may differ from world to world. ``cutoff`` is the distance within which
     neighbours are looked for; None: all pairs of a world. ``reads_velocity`` says that ``apply``
-    reads velocities, which velocity Verlet then predicts; None: if the class's source names them.
+    reads velocities, which velocity Verlet then predicts, and methods of which stages go back in
+    time refuse; None: if the class's source names them.
 
     ``apply`` is recorded once and replayed in every substep: ``wp.launch``, ``wp.copy``, ``zero_``
     and ``fill_`` are, with the numbers and arrays that they are given then, and so is
@@ -161,6 +162,11 @@ class Interaction(Part):
     # has ``follow``.
     implicit: bool = False
 
+    @property
+    def depends_on_velocity(self) -> bool:
+        """Whether its force does in any world; a method that goes back in time cannot take it."""
+        return self.implicit or bool(self.reads_velocity)
+
     def apply(self, state: Any, neighbors: Any, dt: float) -> None:
         """Add forces."""
         raise validate.undefined(self, "apply(self, state, neighbors, dt)")
@@ -196,6 +202,24 @@ class Interaction(Part):
             name: np.array(row, np.int32 if isinstance(row[0], np.integer) else np.float64)
             for name, row in rows.items()
         }
+
+
+class Thermostat(Part):
+    """A heat bath: it changes velocities in the middle of every drift, in turn with the others.
+
+    What ``exchange`` may do is what ``apply`` of an :class:`Interaction` may. It is called by
+    ``Integrator.drift`` and ``move``; a method of which stages go back in time takes none.
+    """
+
+    requires: frozenset[str] = frozenset({"velocity"})
+
+    def exchange(self, state: Any, dt: float) -> None:
+        """Change velocities as the bath does in ``dt``."""
+        raise validate.undefined(self, "exchange(self, state, dt)")
+
+    def fastest(self, scene: Any) -> float:
+        """What a component of a velocity that it gives is about, at most [length/time]."""
+        return 0.0
 
 
 class ConstraintBase(Part):

@@ -11,7 +11,7 @@ import numpy as np
 from .. import validate
 from .bounds import corners, periodic_box
 from .group import PALETTE, Color, Group
-from .part import ConstraintBase, Interaction
+from .part import ConstraintBase, Interaction, Thermostat
 
 # Names of the engine's own per-particle arrays, which attributes of a scene cannot take.
 RESERVED = frozenset(
@@ -24,7 +24,7 @@ CLOSE = 0.72
 
 
 class Scene:
-    """Particles, interactions and constraints, as a description.
+    """Particles, interactions, constraints and thermostats, as a description.
 
     Args:
         up_axis: ``"y"`` or ``"z"``: what pictures and USD show as up; nothing else minds it. With
@@ -58,6 +58,7 @@ class Scene:
         self.groups: list[Group] = []
         self.interactions: list[Interaction] = []
         self.constraints: list[ConstraintBase] = []
+        self.thermostats: list[Thermostat] = []
         self._columns: dict[str, list[np.ndarray]] = {}
         self._widths: dict[str, int | None] = {}
         self.particle_count = 0
@@ -192,6 +193,16 @@ class Scene:
             )
         self._add(self.constraints, "constraint", constraint)
         return constraint
+
+    def add_thermostat(self, thermostat: Thermostat) -> Thermostat:
+        """Add a heat bath; it acts in the middle of every drift, in the order of adding."""
+        if not isinstance(thermostat, Thermostat):
+            raise TypeError(
+                f"Scene.add_thermostat: thermostat must be a Thermostat, got {thermostat!r}; "
+                "make a Langevin or a VelocityRescaling."
+            )
+        self._add(self.thermostats, "thermostat", thermostat)
+        return thermostat
 
     def _add(self, parts: list[Any], kind: str, part: Any) -> None:
         if any(part is each for each in parts):

@@ -8,7 +8,7 @@ from typing import Any
 
 from .. import validate
 
-INTEGRATORS = ("symplectic_euler", "velocity_verlet")
+INTEGRATORS = ("symplectic_euler", "velocity_verlet", "yoshida4", "yoshida6")
 PRECISIONS = ("float32", "float64")
 EXECUTIONS = ("auto", "graph", "threads")
 ON_FAILURE = ("stop", "retry", "freeze")
@@ -29,9 +29,10 @@ class Settings:
             a substep at most what ``safety`` says.
         iterations: Sweeps over the constraints a substep (XPBD). Compliant constraints do not
             depend on it; stiff ones come closer to C = 0.
-        integrator: ``"symplectic_euler"`` (first order, any scene) or ``"velocity_verlet"``
-            (second order, scenes without constraints), or a class of your own derived from
-            :class:`particlesim.Integrator`.
+        integrator: ``"symplectic_euler"`` (first order, any scene); ``"velocity_verlet"`` (second
+            order, scenes without constraints); ``"yoshida4"`` and ``"yoshida6"`` (fourth and sixth
+            order, 3 and 7 evaluations of the forces a substep, with forces of positions alone); or
+            a class of your own derived from :class:`particlesim.Integrator`.
         precision: ``"float32"`` or ``"float64"``, in every kernel.
         skin: Added to the cutoff of neighbour lists [length]; they are rebuilt when a particle has
             moved half of it. Changes the cost, not the forces. None: as thick as pays in each

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..engine.frames import Frames
-from ..engine.integrators import Integrator
+from ..engine.integrators.integrator import Integrator
 from ..engine.loop import Loop
 from ..engine.model import Model
 from ..engine.neighbors.lists import Neighbors
@@ -27,7 +27,7 @@ from ..interactions.fluid.sph import SPH
 from ..output import checkpoint
 from ..pictures.render.camera import Camera
 from ..pictures.render.image import Image
-from ..scene.part import ConstraintBase, Interaction
+from ..scene.part import ConstraintBase, Interaction, Thermostat
 from ..scene.scene import Scene
 from ..scene.settings import Settings
 from .access import Access, World, Writer
@@ -53,6 +53,7 @@ class Reading(Access):
     neighbors: Neighbors
     interactions: Sequence[Interaction]
     constraints: Sequence[ConstraintBase]
+    thermostats: Sequence[Thermostat]
     integrator: Integrator
 
     def _show(self, loop: Loop) -> None:
@@ -61,6 +62,7 @@ class Reading(Access):
         self.model, self.device, self.state = loop.model, loop.model.device, loop.state
         self.neighbors, self.integrator = loop.neighbors, loop.integrator
         self.interactions, self.constraints = loop.interactions, loop.constraints
+        self.thermostats = loop.thermostats
 
     @property
     def incidents(self) -> list[Incident]:

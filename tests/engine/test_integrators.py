@@ -26,13 +26,15 @@ def run(method, steps, device, span=2.0):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_measured_order_of_convergence(method, device):
-    # Richardson: halving dt divides the change by 2^order, to leading order in dt = 0.04.
-    a, b, c = (run(method, steps, device) for steps in (50, 100, 200))
+    # Richardson: halving dt divides the change by 2^order, to leading order in dt = 0.04; for the
+    # higher orders 0.2, where their errors are still far above rounding.
+    first = 50 if METHODS[method].order < 4 else 10
+    a, b, c = (run(method, steps, device) for steps in (first, 2 * first, 4 * first))
     order = np.log2(np.linalg.norm(a - b) / np.linalg.norm(b - c))
     assert order == pytest.approx(METHODS[method].order, abs=0.05)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", ["symplectic_euler", "velocity_verlet"])
 def test_a_step_by_hand(method, precision, device):
     scene = ps.Scene()
     scene.add_particles([(1, 0, 0)], velocity=(0, 1, 0), mass=2.0)
@@ -133,7 +135,10 @@ def test_pinned_particles_keep_their_velocity(method, precision, device):
     sim = ps.Simulation(scene, settings, device=device)
     sim.step()
     np.testing.assert_array_equal(sim.velocity[0], (1, 0, 0))
-    np.testing.assert_array_equal(sim.position[0], (0.5, 0, 0))
+    # Whole stages are binary fractions; others are rounded, each to half a last bit of its part.
+    rounding = sum(abs(w) for w in METHODS[method].stages) - 1
+    rounding *= 0.5 * 0.5 * np.finfo(sim.position.dtype).eps
+    np.testing.assert_allclose(sim.position[0], (0.5, 0, 0), rtol=0, atol=rounding)
     assert sim.velocity[1, 1] < -1
 
 

@@ -13,6 +13,8 @@ SMALL = {
     "dam_break": {"spacing": 0.05},
     "star_collision": {"count": 150},
     "freezing": {"cells": 5},
+    "lj_melt": {"cells": 4},
+    "phase_transition": {"cells": 4},
     "gas_in_a_box": {"count": 400},
     "pile": {"count": 100},
 }

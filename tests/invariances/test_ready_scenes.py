@@ -15,6 +15,8 @@ SMALL = {
     "dam_break": {"spacing": 0.06},
     "star_collision": {"count": 120},
     "freezing": {"cells": 5},
+    "lj_melt": {"cells": 4},
+    "phase_transition": {"cells": 4},
     "gas_in_a_box": {"count": 300},
 }
 FRAMES = 3

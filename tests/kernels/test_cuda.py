@@ -71,6 +71,8 @@ def forces():
     scene.add_interaction(ps.Drag(1.0))
     scene.add_interaction(ps.ConstantForce((0, 1, 0)))
     scene.add_interaction(ps.ParticleForce(swing, potential=swing_energy, axis=(0, 0, 1)))
+    scene.add_thermostat(ps.Langevin(temperature=1.0, friction=1.0))
+    scene.add_thermostat(ps.VelocityRescaling(temperature=1.0, relaxation_time=1.0))
     return scene
 
 

@@ -61,5 +61,7 @@ def test_values_out_of_range(knob, values, refused):
 
 
 def test_choices_are_listed(refused):
-    with refused("must be one of symplectic_euler, velocity_verlet, got 'leapfrog'"):
+    with refused(
+        "must be one of symplectic_euler, velocity_verlet, yoshida4, yoshida6, got 'leapfrog'"
+    ):
         ps.Settings(integrator="leapfrog")

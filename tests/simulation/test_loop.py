@@ -39,7 +39,7 @@ def order(monkeypatch):
         calls.append(kernel.key.rpartition("__")[2])
         original(kernel, *rest)
 
-    monkeypatch.setattr("particlesim.engine.integrators.launch", spy)
+    monkeypatch.setattr("particlesim.engine.integrators.integrator.launch", spy)
     return calls
 
 

@@ -7,11 +7,12 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ... import validate
-from ...scene.settings import INTEGRATORS, PRECISIONS
+from ...scene.settings import PRECISIONS
 from ..study import KNOBS, Study
 from .search import levels
 
 FINEST = 4096  # times the fewest substeps, and at least as many: what is tried at most
+INTEGRATORS = ("symplectic_euler", "velocity_verlet")  # that all forces can go with
 ITERATIONS = (1, 2, 4, 8)
 SKINS = (0.05, 0.2, 0.35)  # of the cutoff, beside what is set
 

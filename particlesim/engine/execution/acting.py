@@ -31,7 +31,7 @@ def act(part: Any, function: Callable[..., None], *arguments: Any) -> None:
     if program is None:
         function(*arguments)
         return
-    own, before = Program(), Attributes(part)
+    own, before = Program(hosts=program.hosts), Attributes(part)
     reason = f"{part.name}.host is set" if part.host else program.hosts.get(id(part), "")
     if not reason:
         try:
@@ -44,6 +44,7 @@ def act(part: Any, function: Callable[..., None], *arguments: Any) -> None:
         program.add(Host(functools.partial(act, part, function, *arguments), part.name, reason))
     else:
         program.operations += own.operations
+        program.acted |= own.acted  # who was asked to act on the way
     if reason or own.touched:
         program.acted.add(id(part))
 

@@ -5,7 +5,8 @@ m (v - v0) = sum_k J_k exactly, whatever the integrator, where part k's impulse 
 
     symplectic Euler    an interaction: f_k dt; a constraint: m c_k / dt, with c_k what it moved the
                         particle by, and m times what it added to the velocity afterwards
-    velocity Verlet     f_k dt / 2 at the start and f_k dt / 2 at the end
+    velocity Verlet     f_k dt / 2 at the start and f_k dt / 2 at the end, of every stage
+    either              a thermostat: m times what it added to the velocity
 
 Its work is W_k = J_k . (v0 + v) / 2. So the works add up to the change of the kinetic energy,
 
@@ -16,8 +17,10 @@ began, as of a block at rest on the ground, neither gravity nor ground has done 
 
 The angular impulse is x x J with the position at which J acts on the momentum: x0, the substep's
 start, for all but what comes after the positions have moved (Verlet's second half, bounces), with x
-at its end. The drift turns nothing, and the sum is the change of the angular momentum. (Not in a
-periodic box, whose wraps move angular momentum about.)
+at its end. A thermostat acts where the drift is half done, on the mean of both but for what is
+along its impulse. The drift turns nothing, and the sum is the change of the angular momentum. (Not
+in a periodic box, whose wraps move angular momentum about; with constraints and thermostats but for
+what the first move a particle by between these.)
 
 All sums are float64, in blocks of fixed bounds; a particle's share is of the state's precision.
 """
@@ -30,23 +33,25 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ...engine.blocks import blocks
 from ...engine.execution.copies import copy, zero
 from ...engine.execution.launch import launch, owner
 from ...engine.loop import Loop
 from ...engine.model import Model, filled
-from ...engine.observers import FOLLOW, FORCE, PROJECT, Observer
+from ...engine.observers import EXCHANGE, FOLLOW, FORCE, PROJECT, Observer
 from ...engine.state import State
 from ...kernels.instruments.ledger import TOTALS, account_kernel, change_kernel, ledger_type
-from ..diagnostics import blocks
 
+INTERACTION, CONSTRAINT, THERMOSTAT = "interaction", "constraint", "thermostat"
 BLOCK_CPU, BLOCK_CUDA = 256, 16  # particles that a thread sums
 
 
 class Account:
     """One part: its changes in a substep, and its totals by blocks."""
 
-    def __init__(self, part: Any, acts: bool, early: wp.array, late: wp.array, totals: wp.array):
-        self.part, self.acts = part, acts  # whether it is an interaction
+    def __init__(self, part: Any, kind: str, early: wp.array, late: wp.array, totals: wp.array):
+        self.part, self.kind = part, kind
+        self.acts = kind == INTERACTION
         self.early, self.late, self.totals = early, late, totals
 
 
@@ -69,8 +74,9 @@ class Accounts(Observer):
             "x": state.position, "v": state.velocity,
         }  # fmt: skip
         self.read = filled(ledger_type(model.precision), arrays)
-        self.accounts = [self._open(part, True) for part in loop.interactions]
-        self.accounts += [self._open(part, False) for part in loop.constraints]
+        self.accounts = [self._open(part, INTERACTION) for part in loop.interactions]
+        self.accounts += [self._open(part, CONSTRAINT) for part in loop.constraints]
+        self.accounts += [self._open(part, THERMOSTAT) for part in loop.thermostats]
         self.start = wp.zeros(model.world_count, dtype=TOTALS, device=model.device)
         self.begin_anew(range(model.world_count))
 
@@ -78,11 +84,12 @@ class Accounts(Observer):
         count, dtype = self.model.particle_count, self.model.precision.vec3
         return wp.zeros(count, dtype=dtype, device=self.model.device)
 
-    def _open(self, part: Any, acts: bool) -> Account:
+    def _open(self, part: Any, kind: str) -> Account:
         early = self._rows()
-        late = early if acts and not self.halves else self._rows()
+        one = kind == THERMOSTAT or (kind == INTERACTION and not self.halves)
+        late = early if one else self._rows()
         totals = wp.zeros(len(self.world), dtype=TOTALS, device=self.model.device)
-        return Account(part, acts, early, late, totals)
+        return Account(part, kind, early, late, totals)
 
     # In a substep -----------------------------------------------------------------------------
 
@@ -104,7 +111,8 @@ class Accounts(Observer):
         mine = next(each for each in self.accounts if each.part is part)
         change = mine.early if stage == PROJECT else mine.late
         with owner("ledger"):
-            inputs = [self._changing(stage), self.seen, int(stage in (FOLLOW, PROJECT)), change]
+            more = int(stage in (FOLLOW, PROJECT, EXCHANGE))
+            inputs = [self._changing(stage), self.seen, more, change]
             launch(change_kernel(self.model.precision), len(change), inputs, self.model.device)
 
     def end(self, dt: float) -> None:
@@ -121,6 +129,8 @@ class Accounts(Observer):
         """What turns a part's changes into impulses, or into velocities for a constraint."""
         if each.acts:
             return (0.5 * dt, 0.5 * dt) if self.halves else (dt, 0.0)
+        if each.kind == THERMOSTAT:
+            return 0.5, 0.5
         return (1.0 / dt if dt > 0 else 0.0), 1.0
 
     def _changing(self, stage: str) -> wp.array:

@@ -15,10 +15,11 @@ from .accounts import Accounts
 
 @dataclass(frozen=True)
 class Entry:
-    """One interaction or constraint, since the start.
+    """One interaction, constraint or thermostat, whose work is the heat it gave, since the start.
 
     work (worlds,) [J]; impulse (worlds, 3) [N s]; angular_impulse about the origin (worlds, 3)
-    [N m s]; float64. kind: ``"interaction"`` or ``"constraint"``.
+    [N m s]; float64. kind: ``"interaction"``, ``"constraint"`` or
+    ``"thermostat"``.
     """
 
     name: str
@@ -108,7 +109,6 @@ def read(accounts: Accounts | None) -> Ledger:
         used[name] += 1
         if used[name] > 1:
             name = f"{name} {used[name]}"
-        kind = "interaction" if account.acts else "constraint"
-        entries.append(Entry(name, kind, sums[:, 0], sums[:, 1:4], sums[:, 4:7]))
+        entries.append(Entry(name, account.kind, sums[:, 0], sums[:, 1:4], sums[:, 4:7]))
     change = accounts.change()
     return Ledger(tuple(entries), change[:, 0], change[:, 1:4], change[:, 4:7])

@@ -1,10 +1,10 @@
 """Limits: how far and how fast the particles of each world may be before the watchdog barks.
 
 Fast: |v| beyond sqrt(F) times the *pace* of the world, on any axis. The pace is the fastest start,
-or the extent of the start a frame, whichever is more; F is ``Settings.energy_growth``. In terms of
-energy: that of a particle is F times the largest there was cause for, and F times that of crossing
-the whole scene within a frame. A world may have cause for it (see :mod:`.trace`); its
-pace is raised then.
+the extent of the start a frame, or what its thermostats give, whichever is most; F is
+``Settings.energy_growth``. In terms of energy: that of a particle is F times the largest there was
+cause for, and F times that of crossing the whole scene within a frame. A world may have cause for
+it (see :mod:`.trace`); its pace is raised then.
 
 Far: outside ``Scene(bounds=...)``; or where the last bit of a coordinate is more than half the skin
 of the scene's neighbour lists or the smallest radius, so that nobody can say any more who touches
@@ -84,8 +84,15 @@ class Limits:
             # A single point has no extent: its coordinates are on some scale, too.
             "extent": np.where(extent > 0, extent, farthest),
             "farthest": farthest,
-            "pace": self._by_world(np.fmax, np.abs(v)).max(axis=1),
+            "pace": np.fmax(self._by_world(np.fmax, np.abs(v)).max(axis=1), self._warmth()),
         }
+
+    def _warmth(self) -> np.ndarray:
+        """The largest speeds that thermostats are there to give, (worlds,)."""
+        scenes = self.model.scenes
+        return np.array(
+            [max((each.fastest(s) for each in s.thermostats), default=0.0) for s in scenes]
+        )
 
     def _resolved(self, neighbors: Neighbors) -> np.ndarray:
         """Coordinates up to which positions serve the scene, (worlds,)."""

@@ -153,7 +153,7 @@ def _lengths(array: wp.array) -> np.ndarray:
 def conserves(loop: Loop) -> bool:
     """Whether nothing acts but forces that have a potential, which does not change in time."""
     return (
-        bool(loop.interactions) and not loop.constraints
+        bool(loop.interactions) and not loop.constraints and not loop.thermostats
         and all(each.conservative for each in loop.interactions)
     )  # fmt: skip
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ...engine.blocks import blocks
 from ...engine.execution.launch import launch, owner
 from ...engine.frames import Frames
 from ...engine.loop import Loop
@@ -21,7 +22,6 @@ from ...engine.model import Model
 from ...engine.neighbors.lists import Neighbors
 from ...engine.state import State
 from ...kernels.instruments.watchdog import check_kernel, hold_kernel
-from ..diagnostics import blocks
 from .incident import Incident, SimulationError, SimulationWarning
 from .limits import ESCAPED, FAST, FINITE, Limits
 from .trace import Culprit, causes, survey, trace

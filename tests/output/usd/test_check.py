@@ -19,6 +19,8 @@ SMALL = {
     "dam_break": {"spacing": 0.1},
     "star_collision": {"count": 50},
     "freezing": {"cells": 4},
+    "lj_melt": {"cells": 4},
+    "phase_transition": {"cells": 4},
     "gas_in_a_box": {"count": 50},
 }
 

@@ -1,18 +1,18 @@
-"""Time integration: one class a method, each saying what happens around the forces."""
+"""Integrator: what happens around the forces, and the base of every method."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
-from .. import validate
-from ..kernels.engine.implicit import implicit_kernels
-from ..kernels.engine.integrate import motion_type
-from ..kernels.engine.motion_kernels import integration_kernels, tick_kernel
-from ..scene.settings import INTEGRATORS, Settings
-from .execution.launch import launch
-from .limit import explicit_step, predicted_step
-from .model import Model
-from .state import State
+from ... import validate
+from ...kernels.engine.implicit import implicit_kernels
+from ...kernels.engine.integrate import motion_type
+from ...kernels.engine.motion_kernels import go_on_kernel, integration_kernels, tick_kernel
+from ..execution.launch import launch
+from ..limit import explicit_step
+from ..model import Model
+from ..state import State
 
 
 class Integrator:
@@ -20,8 +20,14 @@ class Integrator:
 
     A substep of ``dt`` is ``begin``; the interactions' forces at the positions that it leaves;
     ``advance``; the constraints; ``finish``. A member says what happens in ``begin`` and
-    ``advance``, made of :meth:`kick`, :meth:`drift` and :meth:`move`. Its class is given to the
+    ``advance``, made of :meth:`kick`, :meth:`drift` and :meth:`move`; thermostats act in the middle
+    of every drift. Its class is given to the
     settings, ``Settings(integrator=YourClass)``, and ``model`` and ``state`` are there to be read.
+
+    A method of several evaluations of the forces names its ``stages``: all of that is done once for
+    each of them, with the stage's part of ``dt``. They add up to 1. One may be negative: it goes
+    back, and the clock with it, so that neither constraints, thermostats nor forces that depend on
+    velocities are taken.
 
     What turns the velocity of a particle, as a magnetic field does, is taken at the velocity half a
     kick ahead, v' = v + w f(v') dt / 2, to first order in v' - v (Rosenbrock 1963): a kick then
@@ -52,6 +58,7 @@ class Integrator:
     """
 
     order: int = 1
+    stages: tuple[float, ...] = (1.0,)
     carries_forces = False
 
     @property
@@ -60,6 +67,7 @@ class Integrator:
         return self.order > 1
 
     host = False  # whether it works in Python, and so has to be called in every substep
+    exchange: Callable[[float], None] | None = None  # has thermostats act; None: there are none
 
     def __init__(
         self, model: Model, state: State, *, constrained: bool = False, remember: bool = False,
@@ -94,12 +102,18 @@ class Integrator:
             model.precision, model.periodic, forces, settings.compensated, constrained, remember,
             model.vectorised,
         )  # fmt: skip
+        self.go_on = go_on_kernel(model.precision, model.periodic, settings.compensated, remember)
         self.motion = _motion(model, state)
 
     @property
     def name(self) -> str:
-        """What reports call it."""
-        return next((n for n, each in METHODS.items() if each is type(self)), type(self).__name__)
+        """What reports call it: its own title, or its class."""
+        return str(vars(type(self)).get("title", type(self).__name__))
+
+    @classmethod
+    def reach(cls) -> float:
+        """The longest stage, in substeps."""
+        return max(abs(weight) for weight in cls.stages)
 
     def largest_step(self, omega_squared: float, gamma: float) -> float:
         """Largest stable step of x'' = -omega^2 x - gamma x', the damping not implicit [time]."""
@@ -149,11 +163,24 @@ class Integrator:
         self.move(0.0, dt)
 
     def move(self, kick: float, drift: float) -> None:
-        """v += w f kick; x += v drift, in one launch. The clock goes with the positions."""
-        self._launch_blocks(self.kernels.advance, kick, drift)
+        """v += w f kick; x += v drift, in one launch. The clock goes with the positions.
+
+        Thermostats, where there are any, act in the middle of the drift.
+        """
+        if self.exchange is None:
+            self._launch_blocks(self.kernels.advance, kick, drift)
+            self._tick(drift)
+            return
+        self._launch_blocks(self.kernels.advance, kick, 0.5 * drift)
+        self._tick(0.5 * drift)
+        self.exchange(drift)
+        self._launch(self.go_on, 0.5 * drift)
+        self._tick(0.5 * drift)
+
+    def _tick(self, dt: float) -> None:
         if "time" in self.state:
             model = self.model
-            launch(tick_kernel(), model.world_count, [drift, self.state.time], model.device)
+            launch(tick_kernel(), model.world_count, [dt, self.state.time], model.device)
 
     def _launch_blocks(self, kernel: Any, *scalars: float) -> None:
         inputs, block = [*scalars, self.motion], self.kernels.block
@@ -161,63 +188,6 @@ class Integrator:
 
     def _launch(self, kernel: Any, *scalars: float) -> None:
         launch(kernel, self.count, [*scalars, self.motion], self.model.device)
-
-
-class SymplecticEuler(Integrator):
-    """v += w f dt; x += v dt. First order, symplectic; the integrator that XPBD builds on."""
-
-    order = 1
-
-    def advance(self, dt: float) -> None:
-        self.move(dt, dt)
-
-
-class VelocityVerlet(Integrator):
-    """Kick dt/2, drift dt, forces, kick dt/2 (Swope et al. 1982, eq. 9). Second order.
-
-    One evaluation of the forces a substep: the first kick uses those of the last substep. Forces
-    between particles that depend on velocities, as of dampers and viscosity, and those of one's own
-    see what the last substep's forces would make of them by its end, v + w f dt, which is of second
-    order too (Groot and Warren 1997, eq. 8).
-    """
-
-    order = 2
-    carries_forces = True
-
-    def largest_step(self, omega_squared: float, gamma: float) -> float:
-        return predicted_step(omega_squared, gamma)
-
-    def begin(self, dt: float) -> None:
-        self.move(0.5 * dt, dt)
-        if self.predicted:
-            self._launch(self.kernels.foresee, 0.5 * dt)
-
-    def advance(self, dt: float) -> None:
-        if self.predicted:
-            self._launch(self.kernels.go_back)
-        self.kick(0.5 * dt)
-
-
-METHODS: dict[str, type[Integrator]] = dict(
-    zip(INTEGRATORS, (SymplecticEuler, VelocityVerlet), strict=True)
-)
-
-
-def method(settings: Settings) -> type[Integrator]:
-    """The class that settings name or give.
-
-    Raises:
-        TypeError: A class that is no Integrator.
-    """
-    given = settings.integrator
-    if isinstance(given, str):
-        return METHODS[given]
-    if not issubclass(given, Integrator):
-        raise TypeError(
-            f"Settings: integrator must be a name or a subclass of Integrator, got {given!r}; "
-            "derive it from particlesim.Integrator."
-        )
-    return given
 
 
 def _motion(model: Model, state: State) -> Any:

@@ -1,0 +1,1 @@
+"""Thermostats: heat baths that particles exchange energy with, one file a kind."""
