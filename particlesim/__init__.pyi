@@ -19,6 +19,12 @@ from .instruments.ledger.ledger import Ledger
 from .instruments.profile import Profile
 from .instruments.stability import Stability, StabilityWarning
 from .instruments.watchdog.incident import Incident, SimulationError, SimulationWarning
+from .interactions.bonded.angles import Angles, HarmonicAngles
+from .interactions.bonded.bonds import Bonds
+from .interactions.bonded.dihedrals import Dihedrals
+from .interactions.bonded.fene_bonds import FENEBonds
+from .interactions.bonded.harmonic_bonds import HarmonicBonds
+from .interactions.bonded.springs import Springs
 from .interactions.fluid.equations_of_state import EquationOfState, Polytrope, Tait
 from .interactions.fluid.sph import SPH
 from .interactions.fluid.viscosities import ArtificialViscosity, Viscosity
@@ -27,7 +33,6 @@ from .interactions.lennard_jones import LennardJones
 from .interactions.pair import PairForce, PairPotential
 from .interactions.pair_sum import PairSum
 from .interactions.particle import ConstantForce, Drag, ParticleForce, UniformGravity
-from .interactions.springs import Springs
 from .output.history.writer import History, read_history
 from .output.surface import Surface
 from .output.usd.recorder import UsdRecorder
@@ -42,7 +47,9 @@ from .simulation.simulation import Simulation
 
 __all__ = [
     "SPH",
+    "Angles",
     "ArtificialViscosity",
+    "Bonds",
     "Boundary",
     "BoxBoundary",
     "Camera",
@@ -51,11 +58,15 @@ __all__ = [
     "ConstraintBase",
     "ConstraintForce",
     "Contact",
+    "Dihedrals",
     "Distance",
     "Drag",
     "EquationOfState",
+    "FENEBonds",
     "Gravity",
     "Group",
+    "HarmonicAngles",
+    "HarmonicBonds",
     "History",
     "Incident",
     "Integrator",
