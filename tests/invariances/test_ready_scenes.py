@@ -16,6 +16,7 @@ SMALL = {
     "star_collision": {"count": 120},
     "freezing": {"cells": 5},
     "gas_in_a_box": {"count": 300},
+    "polymer_melt": {"edge": 6},
 }
 FRAMES = 3
 

@@ -14,6 +14,7 @@ SMALL = {
     "star_collision": {"count": 120},
     "freezing": {"cells": 4},
     "gas_in_a_box": {"count": 300},
+    "polymer_melt": {"edge": 6},
 }
 FRAMES = {"three_body": 20, "triple_pendulum": 20}
 

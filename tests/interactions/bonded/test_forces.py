@@ -108,8 +108,8 @@ def test_threads_graphs_and_single_precision_agree(device):
     for precision in ("float32", "float64"):
         found = []
         for knobs in (
-            {"execution": "graph", "threads": 1}, {"execution": "threads", "threads": 2},
-            {"execution": "eager"},
+            {"execution": "graph", "threads": 1}, {"execution": "threads", "threads": 1},
+            {"execution": "threads", "threads": 2},
         ):  # fmt: skip
             settings = ps.Settings(dt=0.01, substeps=5, precision=precision, **knobs)
             sim = ps.Simulation(scene, settings, device=device)

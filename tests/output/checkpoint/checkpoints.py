@@ -16,6 +16,7 @@ SMALL = {
     "dam_break": {"spacing": 0.05},
     "star_collision": {"count": 150},
     "freezing": {"cells": 5},
+    "polymer_melt": {"edge": 6},
     "gas_in_a_box": {"count": 400},
     "pile": {"count": 100},
 }
