@@ -15,6 +15,12 @@ from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
 from .engine.execution.launch import launch
 from .engine.integrators import Integrator
+from .instruments.correlations import (
+    RadialDistribution,
+    mean_square_displacement,
+    radial_distribution,
+    velocity_autocorrelation,
+)
 from .instruments.ledger.ledger import Ledger
 from .instruments.profile import Profile
 from .instruments.stability import Stability, StabilityWarning
@@ -82,6 +88,7 @@ __all__ = [
     "PlaneBoundary",
     "Polytrope",
     "Profile",
+    "RadialDistribution",
     "Scene",
     "Settings",
     "Simulation",
@@ -102,10 +109,13 @@ __all__ = [
     "__version__",
     "launch",
     "law",
+    "mean_square_displacement",
     "measure",
+    "radial_distribution",
     "read_history",
     "sample",
     "stress",
     "tradeoff",
-    "tune"
+    "tune",
+    "velocity_autocorrelation"
 ]  # fmt: skip

@@ -22,7 +22,9 @@ def sample(sim: Source) -> dict[str, np.ndarray]:
         for name in ("momentum", "angular_momentum"):
             vectors = getattr(total, name)
             values |= {f"{name}_{axis}": vectors[:, k] for k, axis in enumerate("xyz")}
-        values |= {name: getattr(total, name) for name in ("kinetic", "potential", "energy")}
+        names = ["kinetic", "potential", "energy", "temperature"]
+        names += ["pressure"] if np.isfinite(total.volume).all() else []
+        values |= {name: getattr(total, name) for name in names}
         for label, part, own in zip(
             _labels(sim.interactions), sim.interactions, potentials, strict=True
         ):
