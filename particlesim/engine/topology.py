@@ -36,11 +36,11 @@ def tuples(owner: str, argument: str, value: Any, arity: int | None) -> np.ndarr
             owner, f"{argument}[{at}]", "name different particles", index[at].tolist(),
             "leave the row out",
         )  # fmt: skip
-    _check_once(owner, argument, ordered if index.shape[1] == 2 else index)
+    check_once(owner, argument, ordered if index.shape[1] == 2 else index)
     return index.astype(np.int64)
 
 
-def _check_once(owner: str, argument: str, index: np.ndarray) -> None:
+def check_once(owner: str, argument: str, index: np.ndarray) -> None:
     """Refuse rows that are there twice, as the edges of triangles are: they would count twice."""
     once, first, count = np.unique(index, axis=0, return_index=True, return_counts=True)
     if len(once) < len(index):

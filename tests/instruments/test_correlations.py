@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
+from cases.parts import bending, screened
 
 
 def gas(count=400, side=3.0, temperature=1.7, seed=0):
@@ -47,9 +48,9 @@ def test_pressure_is_minus_the_slope_of_the_energy_by_the_volume(device):
         scene = ps.Scene(periodic=((0, 0, 0), (side,) * 3))
         x = ps.sample.lattice("sc", (4, 4, 4), 1.0) + rng.uniform(-0.1, 0.1, (64, 3))
         scene.add_particles(x * scale)
-        scene.add_interaction(ps.LennardJones(cutoff=1.9, truncation="force_shift"))
-        scene.add_interaction(ps.FENEBonds([(0, 1), (5, 4)]))
-        scene.add_interaction(ps.HarmonicAngles([(0, 1, 2), (6, 5, 4)], 3.0, 1.0))
+        scene.add_interaction(ps.LennardJones(cutoff=1.9, truncation="shift"))
+        scene.add_interaction(ps.Bonds([(0, 1), (5, 4)], screened, strength=3.0, reach=1.4))
+        scene.add_interaction(ps.Angles([(0, 1, 2), (6, 5, 4)], bending, epsilon=3.0))
         return ps.Simulation(scene, ps.Settings(precision="float64"), device=device)
 
     h = 1e-4

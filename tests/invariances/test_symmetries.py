@@ -15,8 +15,8 @@ SETTINGS = ps.Settings(dt=0.02, substeps=2, precision="float64", iterations=2)
 ORDER = np.random.default_rng(7).permutation(COUNT)
 FORCES = [name for name in kinds() if issubclass(kinds()[name], Interaction)]
 HOLDING = [name for name in kinds() if name not in FORCES]
-# Springs, Bonds and Angles go together with all others for those of their machinery, too.
-APART = [name for name in FORCES if name not in {"HarmonicBonds", "FENEBonds", "HarmonicAngles"}]
+# Their kin goes together with all others for those of the same machinery, too.
+APART = [name for name in FORCES if name not in ("HarmonicBonds", "FENEBonds", "HarmonicAngles")]
 # What knows a place, a direction or a medium of its own takes up momentum.
 EXTERNAL = {"BoxBoundary", "PlaneBoundary", "SphereBoundary", "Boundary", "ConstantForce", "Drag",
             "ParticleForce", "UniformGravity"}  # fmt: skip

@@ -182,6 +182,8 @@ def simulate(name, precision):
     peak = sim.model.array(np.zeros(sim.particle_count), sim.model.precision.scalar)
     sim.frames._record(sim.settings.substeps, peak)
     sample(sim)
+    if all(sim.model.periodic):
+        ps.radial_distribution(sim)
     sim.project(1)
     sim.loop.frame = 1
     sim.rounds.make()

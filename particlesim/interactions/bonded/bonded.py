@@ -55,7 +55,9 @@ class Bonded(Interaction):
         self.law = make_law(law)
         self.law.check_derivable(self.name)
         self._check_coordinate()
-        setattr(self, self.argument, topology.tuples(self.name, self.argument, tuples, self.size))
+        index = topology.tuples(self.name, self.argument, tuples, self.size)
+        topology.check_once(self.name, self.argument, _from_the_lower_end(index))
+        setattr(self, self.argument, index)
         self.arguments = ItemArguments(
             self.name, self.law, len(self.tuples), parameters, SUFFIXES[: self.size]
         )
@@ -159,6 +161,11 @@ class Bonded(Interaction):
     def complaint(self) -> str:
         """That places are too coarse for how far the particles of a tuple are apart."""
         return self.model.unresolved(self.name, "distances", self.shortest, self.members)
+
+
+def _from_the_lower_end(index: np.ndarray) -> np.ndarray:
+    """Tuples named from one end: the same backwards is the same angle, or dihedral."""
+    return np.where(index[:, :1] < index[:, -1:], index, index[:, ::-1])
 
 
 class ItemArguments(Arguments):

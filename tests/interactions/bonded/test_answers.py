@@ -75,6 +75,11 @@ def test_limits_of_bonds():
     assert limit(scene, precision="float64") == pytest.approx(2 / omega, rel=0.01)
 
 
+# Kernels of single precision are compiled for the long run.
+PRECISIONS = pytest.mark.parametrize(
+    "precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)]
+)
+
 # Angles -------------------------------------------------------------------------------------------
 
 
@@ -98,6 +103,7 @@ def test_an_angle_near_the_straight_has_all_its_digits(bend, device):
     assert energy == pytest.approx(bend**2, rel=2 * rounding)
 
 
+@PRECISIONS
 @pytest.mark.parametrize("angle", [0.0, np.pi], ids=["folded", "straight"])
 def test_on_a_line_forces_are_bounded_and_balanced(angle, precision, device):
     """A law with a slope there bends it, in a direction across; others leave it alone."""
@@ -149,6 +155,7 @@ def test_dihedrals_are_those_of_iupac(dihedral, device):
     np.testing.assert_allclose(size, 2.0 / np.array([1.1, 1.4]) / math.sin(1.9), rtol=1e-14)
 
 
+@PRECISIONS
 @pytest.mark.parametrize("sine", [0.0, 1e-12, 1e-5, 1e-3, 1e-2])
 def test_dihedrals_near_a_line_are_bounded_and_balanced(sine, precision, device):
     part = ps.Dihedrals([(0, 1, 2, 3)], turning, torque=2.0)

@@ -29,6 +29,9 @@ REFUSED = {
         lambda: ps.Dihedrals([(0, 1, 2)], torsion, epsilon=1.0), r"quadruples .*\(m, 4\)"
     ),
     "one twice": (lambda: ps.Angles([(0, 1, 0)], bending, epsilon=1.0), r"triples\[0\] .* differ"),
+    "one backwards": (
+        lambda: ps.Angles([(0, 1, 2), (2, 1, 0)], bending, epsilon=1.0), r"each of its 1 different"
+    ),
     "too many": (
         lambda: ps.Bonds([(0, 1)], screened, strength=[1.0, 2.0], reach=1.0), r"strength .*\(1,\)"
     ),
