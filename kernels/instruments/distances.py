@@ -27,16 +27,19 @@ def distances_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
         begin: wp.array(dtype=wp.int32),  # of each world's among them, and at the end their number
         box: wp.array(dtype=Box),
         x: wp.array(dtype=vec3),
-        bins_by_length: wp.float64,
+        reach: wp.float64,
         count_io: wp.array2d(dtype=wp.int64),
     ):
         k = first + wp.tid()
         i = centres[k]
         w = world[k]
+        bins = count_io.shape[1]
         for n in range(begin[w], begin[w + 1]):
             j = others[n]
-            r = wp.length(wide(image(x[j] - x[i], box[w]))) * bins_by_length
-            if j != i and r < wp.float64(count_io.shape[1]):  # and a number
-                wp.atomic_add(count_io, w, int(r), wp.int64(1))
+            d = wide(image(x[j] - x[i], box[w]))
+            r2 = wp.dot(d, d)
+            if j != i and r2 < reach * reach:
+                b = int(wp.sqrt(r2) / reach * wp.float64(bins))
+                wp.atomic_add(count_io, w, wp.min(b, bins - 1), wp.int64(1))
 
     return count_distances

@@ -68,7 +68,7 @@ def radial_distribution(
     count = wp.zeros((model.world_count, bins), dtype=wp.int64, device=model.device)
     inputs = [
         *(model.array(each.astype(np.int32), wp.int32) for each in (centres, world, others, begin)),
-        model.box, sim.state.position, bins / most, count,
+        model.box, sim.state.position, most, count,
     ]  # fmt: skip
     kernel = distances_kernel(model.precision, model.periodic)
     launch(kernel, len(centres), inputs, model.device)
