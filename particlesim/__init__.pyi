@@ -15,10 +15,22 @@ from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
 from .engine.execution.launch import launch
 from .engine.integrators.integrator import Integrator
+from .instruments.correlations import (
+    RadialDistribution,
+    mean_square_displacement,
+    radial_distribution,
+    velocity_autocorrelation,
+)
 from .instruments.ledger.ledger import Ledger
 from .instruments.profile import Profile
 from .instruments.stability import Stability, StabilityWarning
 from .instruments.watchdog.incident import Incident, SimulationError, SimulationWarning
+from .interactions.bonded.angles import Angles, HarmonicAngles
+from .interactions.bonded.bonds import Bonds
+from .interactions.bonded.dihedrals import Dihedrals
+from .interactions.bonded.fene_bonds import FENEBonds
+from .interactions.bonded.harmonic_bonds import HarmonicBonds
+from .interactions.bonded.springs import Springs
 from .interactions.electrostatics.electrostatics import Electrostatics
 from .interactions.fields.field_force import FieldForce
 from .interactions.fields.poisson import PoissonField
@@ -36,7 +48,6 @@ from .interactions.potentials.mie import LennardJones, Mie
 from .interactions.potentials.morse import Morse
 from .interactions.potentials.soft_sphere import SoftSphere
 from .interactions.potentials.yukawa import Yukawa
-from .interactions.springs import Springs
 from .interactions.thermostats.langevin import Langevin
 from .interactions.thermostats.velocity_rescaling import VelocityRescaling
 from .output.history.writer import History, read_history
@@ -54,7 +65,9 @@ from .simulation.simulation import Simulation
 
 __all__ = [
     "SPH",
+    "Angles",
     "ArtificialViscosity",
+    "Bonds",
     "Boundary",
     "BoxBoundary",
     "Camera",
@@ -64,14 +77,18 @@ __all__ = [
     "ConstraintForce",
     "Contact",
     "Coulomb",
+    "Dihedrals",
     "Distance",
     "Drag",
     "Electrostatics",
     "EquationOfState",
+    "FENEBonds",
     "FieldForce",
     "Gravity",
     "GridField",
     "Group",
+    "HarmonicAngles",
+    "HarmonicBonds",
     "HertzianGrains",
     "History",
     "Incident",
@@ -92,6 +109,7 @@ __all__ = [
     "PoissonField",
     "Polytrope",
     "Profile",
+    "RadialDistribution",
     "Scene",
     "Settings",
     "Simulation",
@@ -117,10 +135,13 @@ __all__ = [
     "__version__",
     "launch",
     "law",
+    "mean_square_displacement",
     "measure",
+    "radial_distribution",
     "read_history",
     "sample",
     "stress",
     "tradeoff",
-    "tune"
+    "tune",
+    "velocity_autocorrelation"
 ]  # fmt: skip

@@ -1,107 +1,151 @@
-"""Forces along given pairs: every particle gathers over its own bonds, so nothing collides."""
+"""Forces of laws of given tuples: every particle gathers over its own, so nothing collides."""
 
 import functools
+from dataclasses import dataclass
 from typing import Any
 
 import warp as wp
 
 from ..engine.loops import Periodicity, box_type, minimum_image
-from ..precision import APART, Precision, function, register, structure
+from ..precision import Precision, function, function_from_source, register, structure
+from .coordinates import steps_type
 
 
-@wp.struct
-class Incidence:
-    """Bonds of every particle that has some: row k is particle ``particle[k]``."""
+@dataclass(frozen=True)
+class Bonds:
+    """What the kernels of some tuples are made for."""
 
-    particle: wp.array(dtype=wp.int32)
-    begin: wp.array(dtype=wp.int32)
-    partner: wp.array(dtype=wp.int32)
-    bond: wp.array(dtype=wp.int32)
-    world: wp.array(dtype=wp.int32)
+    law: wp.Function  # u(q, ...)
+    arguments: tuple[str, ...]  # source of what comes after q, in terms of ids, d and p
+    coordinate: wp.Function  # see ``coordinates``
+    size: int  # particles of a tuple
+    damped: bool  # with a force -p.damping dq/dt beside du/dq
+    precision: Precision
+    periodic: Periodicity
+    data: Any
+    params: Any
+
+    @property
+    def types(self) -> tuple[Any, Any, Any]:
+        """Rows, steps and box."""
+        precision = self.precision
+        return rows_type(self.size), steps_type(precision, self.size), box_type(precision)
 
 
-def spring_type(precision: Precision) -> Any:
-    """Parameters of one spring."""
-    names = ("stiffness", "rest_length", "damping")
-    return structure(f"Spring_{precision.name}", {name: precision.scalar for name in names})
+def indices_type(size: int) -> Any:
+    """The particles of a tuple."""
+    return wp.types.vector(length=size, dtype=wp.int32)
 
 
-def bond_function(precision: Precision, periodic: Periodicity) -> wp.Function:
-    """``view(i, e, bonds, box, x) -> (j, n, r)``: the partner in bond e, and where i is from it.
+def rows_type(size: int) -> Any:
+    """The tuples of every particle that is in one: row k is particle ``particle[k]``.
 
-    Coincident ends push apart along a fixed direction, equally and opposite.
+    A tuple stands in the row of each of its particles, with its parameters, so that what a thread
+    reads of it lies together.
     """
-    vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
-    image, along = minimum_image(precision, periodic), vec3(*APART)
+    one = wp.array(dtype=wp.int32)
+    fields = {
+        "particle": one, "world": one, "begin": one, "ids": wp.array(dtype=indices_type(size)),
+    }  # fmt: skip
+    return structure(f"Rows{size}", fields)
 
-    def view(i: int, e: int, bonds: Incidence, box: Box, x: wp.array(dtype=vec3)):
-        j = bonds.partner[e]
-        x_ij = image(x[i] - x[j], box)
-        r = wp.length(x_ij)
-        side = wp.where(i < j, real(-1.0), real(1.0))
-        apart = r > real(0.0)
-        n = wp.where(apart, x_ij / wp.where(apart, r, real(1.0)), along * side)
-        return j, n, r
 
-    return function(view)
+def _view(bonds: Bonds) -> wp.Function:
+    """``view(ids, b, d, p) -> (u, g, T, E)``: of a tuple the energy, the slope of it by the
+    coordinate, how that answers to the steps, and these.
+    """
+    _Rows, Steps, Box = bonds.types
+    Indices = indices_type(bonds.size)
+    size, damped, real = bonds.size, bonds.damped, bonds.precision.scalar
+    data, params, coordinate = bonds.data, bonds.params, bonds.coordinate
+    image = minimum_image(bonds.precision, bonds.periodic)
+    call = ", ".join(["q", *bonds.arguments])
+    slopes = ", ".join(f"g{k}" for k in range(len(bonds.arguments) + 1))
+    namespace = {
+        "wp": wp, "law": bonds.law, "real": real, "Indices": Indices, "Data": data,
+        "Params": params,
+    }  # fmt: skip
+    derived = function_from_source(
+        "def bonded_law(q: real, ids: Indices, d: Data, p: Params):\n"
+        f"    {slopes} = wp.grad(law)({call})\n    return law({call}), g0\n",
+        namespace, after_gradients=True,
+    )  # fmt: skip
+
+    def bonded_view(ids: Indices, b: Box, d: data, p: params):
+        E = Steps()
+        for e in range(wp.static(size - 1)):
+            E[e] = image(d.x[ids[e + 1]] - d.x[ids[e]], b)
+        q, T = coordinate(E)
+        u, g = derived(q, ids, d, p)
+        if wp.static(damped):
+            rate = real(0.0)
+            for e in range(wp.static(size - 1)):
+                rate += wp.dot(T[e], d.v[ids[e + 1]] - d.v[ids[e]])
+            g = g + p.damping * rate
+        return u, g, T, E
+
+    return function(bonded_view, after_gradients=True)
 
 
 @functools.cache
-def force_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
-    """Kernel: forces of damped springs."""
-    vec3, Box, Spring = precision.vec3, box_type(precision), spring_type(precision)
-    view = bond_function(precision, periodic)
+def force_kernel(bonds: Bonds) -> wp.Kernel:
+    """Kernel: f_a -= g dq/dx_a, where g = du/dq."""
+    Rows, _Steps, Box = bonds.types
+    vec3, real, size = bonds.precision.vec3, bonds.precision.scalar, bonds.size
+    view, data, params = _view(bonds), bonds.data, bonds.params
 
     @register
-    def spring_force(
+    def bonded_force(
         first: int,
-        bonds: Incidence,
-        springs: wp.array(dtype=Spring),
+        rows: Rows,
+        parameters: wp.array(dtype=params),
         box: wp.array(dtype=Box),
-        x: wp.array(dtype=vec3),
-        v: wp.array(dtype=vec3),
+        d: data,
         f_io: wp.array(dtype=vec3),
     ):
         k = first + wp.tid()
-        i = bonds.particle[k]
-        b = box[bonds.world[k]]
+        i = rows.particle[k]
+        b = box[rows.world[k]]
         total = f_io[i]
-        for e in range(bonds.begin[k], bonds.begin[k + 1]):
-            j, n, r = view(i, e, bonds, b, x)
-            s = springs[bonds.bond[e]]
-            rate = wp.dot(v[i] - v[j], n)
-            total = total - n * (s.stiffness * (r - s.rest_length) + s.damping * rate)
+        for n in range(rows.begin[k], rows.begin[k + 1]):
+            ids = rows.ids[n]
+            _u, g, T, _E = view(ids, b, d, parameters[n])
+            for e in range(wp.static(size - 1)):
+                total = total + T[e] * wp.where(
+                    ids[e] == i, g, wp.where(ids[e + 1] == i, -g, real(0.0))
+                )
         f_io[i] = total
 
-    return spring_force
+    return bonded_force
 
 
 @functools.cache
-def measure_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
-    """Kernel: energies and virials of springs, half to each end."""
-    vec3, real = precision.vec3, precision.scalar
-    Box, Spring, view = (
-        box_type(precision), spring_type(precision), bond_function(precision, periodic),
-    )  # fmt: skip
+def measure_kernel(bonds: Bonds) -> wp.Kernel:
+    """Kernel: energy and virial -sum_e g T_e . E_e, to each of a tuple's particles its share."""
+    Rows, _Steps, Box = bonds.types
+    size, view, real = bonds.size, _view(bonds), bonds.precision.scalar
+    data, params = bonds.data, bonds.params
 
     @register
-    def spring_measure(
+    def bonded_measure(
         first: int,
-        bonds: Incidence,
-        springs: wp.array(dtype=Spring),
+        rows: Rows,
+        parameters: wp.array(dtype=params),
         box: wp.array(dtype=Box),
-        x: wp.array(dtype=vec3),
+        d: data,
         energy_io: wp.array(dtype=wp.float64),
         virial_io: wp.array(dtype=wp.float64),
     ):
         k = first + wp.tid()
-        i = bonds.particle[k]
-        b = box[bonds.world[k]]
-        for e in range(bonds.begin[k], bonds.begin[k + 1]):
-            _j, _n, r = view(i, e, bonds, b, x)
-            s = springs[bonds.bond[e]]
-            stretch = r - s.rest_length
-            energy_io[i] = energy_io[i] + wp.float64(real(0.25) * s.stiffness * stretch * stretch)
-            virial_io[i] = virial_io[i] - wp.float64(real(0.5) * s.stiffness * stretch * r)
+        i = rows.particle[k]
+        b = box[rows.world[k]]
+        share = wp.float64(wp.static(1.0 / size))
+        for n in range(rows.begin[k], rows.begin[k + 1]):
+            u, g, T, E = view(rows.ids[n], b, d, parameters[n])
+            w = real(0.0)
+            for e in range(wp.static(size - 1)):
+                w -= g * wp.dot(T[e], E[e])
+            energy_io[i] = energy_io[i] + wp.float64(u) * share
+            virial_io[i] = virial_io[i] + wp.float64(w) * share
 
-    return spring_measure
+    return bonded_measure

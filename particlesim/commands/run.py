@@ -204,7 +204,8 @@ def plot(
         str | None,
         typer.Option(
             metavar="NAME,...",
-            help="energy, drift, momentum, angular_momentum, potential, density, residual. "
+            help="energy, drift, momentum, angular_momentum, potential, temperature, pressure, "
+            "density, residual, observed. "
             "Default: all there are.",
         ),
     ] = None,

@@ -87,17 +87,8 @@ class Tuples:
     @functools.cached_property
     def seats(self) -> Seats:
         """The tuples of every particle that is in one."""
-        ends = self.particles.reshape(-1)
-        order = np.argsort(ends, kind="stable")
-        particle, begin = np.unique(ends[order], return_index=True)
-        columns = {
-            "particle": particle,
-            "begin": np.append(begin, len(ends)),
-            "tuple": order // self.size,
-            "seat": order % self.size,
-        }
         result = Seats()
-        for name, column in columns.items():
+        for name, column in topology.incidence(self.particles).items():
             setattr(result, name, self.model.array(column.astype(np.int32), wp.int32))
         return result
 

@@ -36,11 +36,11 @@ def tuples(owner: str, argument: str, value: Any, arity: int | None) -> np.ndarr
             owner, f"{argument}[{at}]", "name different particles", index[at].tolist(),
             "leave the row out",
         )  # fmt: skip
-    _check_once(owner, argument, ordered if index.shape[1] == 2 else index)
+    check_once(owner, argument, ordered if index.shape[1] == 2 else index)
     return index.astype(np.int64)
 
 
-def _check_once(owner: str, argument: str, index: np.ndarray) -> None:
+def check_once(owner: str, argument: str, index: np.ndarray) -> None:
     """Refuse rows that are there twice, as the edges of triangles are: they would count twice."""
     once, first, count = np.unique(index, axis=0, return_index=True, return_counts=True)
     if len(once) < len(index):
@@ -78,24 +78,26 @@ def per_item(owner: str, argument: str, value: Any, count: int, *, minimum: floa
     return result
 
 
-def incidence(pairs: np.ndarray) -> dict[str, np.ndarray]:
-    """The bonds of every particle: particle, begin, partner and bond (see kernels.bonded)."""
-    ends = pairs.reshape(-1)
-    partner = pairs[:, ::-1].reshape(-1)
-    bond = np.repeat(np.arange(len(pairs)), 2)
+def incidence(index: np.ndarray) -> dict[str, np.ndarray]:
+    """The tuples of every particle that is in one: row k is that of ``particle[k]``, and holds
+    the entries ``begin[k]`` to ``begin[k + 1] - 1`` of ``tuple``, and of ``seat``, its place there.
+    """
+    size = index.shape[1]
+    ends = index.reshape(-1)
     order = np.argsort(ends, kind="stable")
     particle, begin = np.unique(ends[order], return_index=True)
     return {
         "particle": particle,
         "begin": np.append(begin, len(ends)),
-        "partner": partner[order],
-        "bond": bond[order],
+        "tuple": order // size,
+        "seat": order % size,
     }
 
 
 def rest_lengths(
-    owner: str, model: Model, w: int, pairs: np.ndarray, given: np.ndarray | None
-) -> np.ndarray:
+    owner: str, model: Model, w: int, pairs: np.ndarray, given: np.ndarray | None,
+    argument: str = "rest_length",
+) -> np.ndarray:  # fmt: skip
     """Rest lengths of the pairs of world w, (m,): as given, or the distances at the start.
 
     Distances are those to the nearest image, and along an axis none is further than half a box.
@@ -106,13 +108,13 @@ def rest_lengths(
     """
     start = steps(model, w, pairs)[:, 0]
     result = start if given is None else given
-    model.squares_fit(owner, "rest_length", np.maximum(start, result))
+    model.squares_fit(owner, argument, np.maximum(start, result))
     for axis, on in enumerate(model.periodic):
         half = 0.5 * model.box_length[w, axis]
         if on and len(result) and result.max() > half * (1 + 1e-9):
             at = int(np.argmax(result))
             raise validate.fail(
-                owner, f"rest_length[{at}]",
+                owner, f"{argument}[{at}]",
                 f"be at most half the periodic length along {'xyz'[axis]}, {half:g} [length]",
                 float(result[at]), "enlarge the box, or put particles between",
             )  # fmt: skip

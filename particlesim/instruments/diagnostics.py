@@ -29,7 +29,8 @@ class Diagnostics(Report):
     mass (worlds,), momentum (worlds, 3) and angular_momentum about the origin (worlds, 3);
     kinetic and potential energy, their sum ``energy``, and the virial sum of r.F over pairs,
     (worlds,), to which constraints between particles and contacts add that of the last substep.
-    Pinned particles count in the mass and the potential energy only.
+    Pinned particles count in the mass and the potential energy only; ``free`` is how many are not,
+    and ``volume`` that of the periodic box, not a number where an axis is open, (worlds,).
     """
 
     mass: np.ndarray
@@ -38,16 +39,37 @@ class Diagnostics(Report):
     kinetic: np.ndarray
     potential: np.ndarray
     virial: np.ndarray
+    free: np.ndarray
+    volume: np.ndarray
 
     @property
     def energy(self) -> np.ndarray:
         """Kinetic plus potential energy."""
         return self.kinetic + self.potential
 
+    @property
+    def temperature(self) -> np.ndarray:
+        """k T = 2 K / (3 n) of the n particles that are not pinned [energy]; 0 without any.
+
+        All 3 n velocities count, as a thermostat, a wall or a field exchanges momentum. Where
+        nothing does and the momentum is zero, three of them are fixed, and the temperature is
+        n / (n - 1) of this (Frenkel and Smit 2002, section 4.1.1); a rod fixes one more each.
+        """
+        return 2.0 * self.kinetic / (3.0 * np.maximum(self.free, 1))
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """P = (2 K + sum r.F) / (3 V) (Clausius 1870) [energy/length^3], (worlds,).
+
+        Not a number where an axis is open: such a scene has no volume. Fields and boundaries, which
+        act from outside, have no part in it.
+        """
+        return (2.0 * self.kinetic + self.virial) / (3.0 * self.volume)
+
     def __str__(self) -> str:
         heads = [("world" if len(self.mass) > 1 else "", "right")]
         columns = [[str(w) if len(self.mass) > 1 else "" for w in range(len(self.mass))]]
-        for name in ("mass", "kinetic", "potential", "energy", "virial"):
+        for name in ("mass", "kinetic", "potential", "energy", "virial", "temperature", "pressure"):
             heads.append((name, "right"))
             columns.append([f"{value:.6g}" for value in getattr(self, name)])
         for name in ("momentum", "angular_momentum"):
@@ -130,9 +152,13 @@ def _measure(sim: Source, forces: Source, potentials: list[np.ndarray] | None) -
     )  # fmt: skip
     total = np.zeros((model.world_count, QUANTITIES))
     np.add.at(total, world, sums.numpy())
+    free = np.bincount(model.world_of, model.column("pinned") == 0, model.world_count)
+    length = model.box_length
+    volume = np.where((length > 0).all(axis=1), length.prod(axis=1), np.nan)
     return Diagnostics(
-        total[:, 0], total[:, 1:4], total[:, 4:7], total[:, 7], total[:, 8], total[:, 9]
-    )
+        total[:, 0], total[:, 1:4], total[:, 4:7], total[:, 7], total[:, 8], total[:, 9], free,
+        volume,
+    )  # fmt: skip
 
 
 @contextlib.contextmanager

@@ -23,8 +23,8 @@ from .resume import OWNER, Checkpoints
 
 def run(
     sim: Reading, step: Callable[[], None], frames: int, *, record: Any,
-    progress: bool | Callable[[int, int], None], history: Any, overwrite: bool, resume: bool,
-    **options: Any,
+    progress: bool | Callable[[int, int], None], history: Any, observe: Any,
+    overwrite: bool, resume: bool, **options: Any,
 ) -> None:  # fmt: skip
     """Advance by ``frames`` frames (see :meth:`Simulation.run`)."""
     first = sim.frame
@@ -52,7 +52,7 @@ def run(
             _refuse_without_record({"resume": resume, **options})
         if history is not None:
             measured = stack.enter_context(
-                History(sim, history, overwrite=overwrite, resume=resume)
+                History(sim, history, overwrite=overwrite, resume=resume, observe=observe)
             )
             measured.write()
             if recording is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Self
@@ -128,6 +128,7 @@ class Simulation(Reading):
         fields: str | Iterable[str] = (),
         progress: bool | Callable[[int, int], None] = False,
         history: Any = None,
+        observe: Mapping[str, Callable[[Any], Any]] | None = None,
         checkpoint: int | None = None,
         resume: bool = False,
         **options: Any,
@@ -149,6 +150,8 @@ class Simulation(Reading):
                 (frame, frames).
             history: Path of a ``.csv`` or ``.jsonl`` file to write energies, momenta and errors of
                 the start and every frame to (see ``ps.History``).
+            observe: What else to write there: functions of the simulation by name, such as
+                ``{"msd": ps.mean_square_displacement}``.
             checkpoint: Frames from one checkpoint to the next; 0: none. None: by the clock, at
                 less than 2 % of the time.
             resume: Go on with the run that recorded to ``record``; where there is none, start it.
@@ -167,8 +170,8 @@ class Simulation(Reading):
         warn_if_past(self.loop)
         run(
             self, self.step, frames, record=record, progress=progress, history=history,
-            overwrite=overwrite, checkpoint=checkpoint, resume=resume, fields=names,
-            **options,
+            observe=observe, overwrite=overwrite, checkpoint=checkpoint, resume=resume,
+            fields=names, **options,
         )  # fmt: skip
 
     def project(self, iterations: int) -> None:

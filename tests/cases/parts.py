@@ -17,6 +17,10 @@ from particlesim.scene.part import ConstraintBase, Interaction
 FORCE, STIFFNESS = (1, 1, -2), (0, 1, -2)
 COUNT = 8
 PAIRS = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (6, 7)]
+TUPLES = {
+    "pairs": PAIRS, "particles": PAIRS, "triples": [(0, 1, 3), (1, 3, 7), (4, 5, 7), (2, 6, 4)],
+    "quadruples": [(0, 1, 3, 7), (5, 4, 6, 2), (0, 2, 6, 7)],
+}  # fmt: skip
 
 
 @ps.law
@@ -27,6 +31,16 @@ def screened(r: float, strength: float, reach: float):
 @ps.law
 def repulsion(r: float, stiffness: float, reach: float):
     return stiffness * wp.max(reach - r, 0.0)
+
+
+@ps.law
+def bending(cosine: float, epsilon: float):
+    return epsilon * (1.0 + cosine) * (1.0 + cosine)
+
+
+@ps.law
+def torsion(dihedral: float, epsilon: float):
+    return epsilon * (1.0 + wp.cos(3.0 * dihedral))
 
 
 @ps.law
@@ -75,6 +89,9 @@ QUANTITIES = {
     "reach": Quantity(1.4, (1, 0, 0)),
     "middle": Quantity((0.1, 0.2, -0.1), (1, 0, 0), "point"),
     "size": Quantity(1.9, (1, 0, 0)),
+    "length": Quantity(2.5, (1, 0, 0)),
+    "rest_angle": Quantity(1.9),
+    ("HarmonicAngles", "stiffness"): Quantity(3.0, (2, 1, -2)),
     ("SphereBoundary", "radius"): Quantity(1.9, (1, 0, 0)),
     ("Distance", "damping"): Quantity(0.5, (0, 1, -1)),
 }
@@ -82,11 +99,14 @@ QUANTITIES = {
 LAWS = {
     "PairPotential": (screened, ("strength", "reach")),
     "PairForce": (repulsion, ("stiffness", "reach")),
+    "Bonds": (screened, ("strength", "reach")),
+    "Angles": (bending, ("epsilon",)),
+    "Dihedrals": (torsion, ("epsilon",)),
     "ParticleForce": (trap, ("stiffness", "middle")),
     "Constraint": (separation, ("rest_length",)),
     "Boundary": (bowl, ("middle", "size")),
 }
-PLAIN = {"pairs": PAIRS, "particles": PAIRS, "group": None, "exponents": (12, 6)}
+PLAIN = {**TUPLES, "group": None, "exponents": (12, 6)}
 LEFT_OUT = {"break_force", "inequality", "tension_only", "truncation", "inside", "potential",
             "smoothing", "dimension", "viscosity", "pivot", "drawn"}  # fmt: skip
 

@@ -105,6 +105,23 @@ def springs(u):
     return scene
 
 
+@ps.law
+def torsion(dihedral: float, barrier: float):
+    return barrier * wp.cos(dihedral)
+
+
+def molecule(u):
+    """Four in a chain that swings, bends and turns."""
+    scene = particles(u, [*TRIANGLE, (1.3, 1.6, 0.9)], [*SPIN, (0, 0, 0.2)], mass=(1, 2, 1.5, 0.8))
+    energy = u.of(2, 1, -2)
+    bonds = [(0, 1), (1, 2), (2, 3)]
+    scene.add_interaction(ps.FENEBonds(bonds, 5.0 * u.of(mass=1, time=-2), 2.0 * u.length))
+    scene.add_interaction(ps.HarmonicBonds(bonds, 5.0 * u.of(mass=1, time=-2), 1.2 * u.length))
+    scene.add_interaction(ps.HarmonicAngles([(0, 1, 2), (1, 2, 3)], 2.0 * energy, 1.7))
+    scene.add_interaction(ps.Dihedrals([(0, 1, 2, 3)], torsion, barrier=0.5 * energy))
+    return scene
+
+
 def drag(u):
     scene = particles(u, TRIANGLE, SPIN, mass=(1.0, 2.0, 1.5))
     scene.add_interaction(
@@ -214,8 +231,8 @@ KNOBS = {
     contact: {"substeps": 2},
 }
 PARTS = {each.__name__: each for each in (
-    lennard_jones, law_of_powers, charges, gravity, springs, drag, fluid, contact, soft, rigid,
-    angle, penalty, walls, gas,
+    lennard_jones, law_of_powers, charges, gravity, springs, molecule, drag, fluid, contact, soft,
+    rigid, angle, penalty, walls, gas,
 )}  # fmt: skip
 
 

@@ -32,26 +32,28 @@ def test_values_per_item(refused):
         topology.per_item("O", "k", [1, 2, 3], 2, minimum=0)
 
 
-pairs = st.lists(
-    st.lists(st.integers(0, 20), min_size=2, max_size=2, unique=True), min_size=1, max_size=60
-).map(np.array)
+def lists_of_tuples(size):
+    row = st.lists(st.integers(0, 20), min_size=size, max_size=size, unique=True)
+    return st.lists(row, min_size=1, max_size=60).map(np.array)
+
+
+pairs = lists_of_tuples(2)
 
 
 @settings(deadline=None)
-@given(pairs)
-def test_incidence_lists_every_bond_at_both_ends(index):
+@given(st.integers(1, 4).flatmap(lists_of_tuples))
+def test_incidence_lists_every_tuple_at_all_of_its_particles(index):
     rows = topology.incidence(index)
     found = []
     for k, particle in enumerate(rows["particle"]):
         begin, end = rows["begin"][k], rows["begin"][k + 1]
-        bonds = rows["bond"][begin:end]
-        assert (np.diff(bonds) >= 0).all()  # in the order given: sums are the same every time
+        own = rows["tuple"][begin:end]
+        assert (np.diff(own) >= 0).all()  # in the order given: sums are the same every time
         found += [
-            (particle, int(j), int(b))
-            for j, b in zip(rows["partner"][begin:end], bonds, strict=True)
+            (int(particle), int(r), int(a))
+            for r, a in zip(own, rows["seat"][begin:end], strict=True)
         ]
-    expected = [(a, b, k) for k, (a, b) in enumerate(index.tolist())]
-    expected += [(b, a, k) for a, b, k in expected]
+    expected = [(i, r, a) for r, ids in enumerate(index.tolist()) for a, i in enumerate(ids)]
     assert sorted(found) == sorted(expected)
     assert (np.diff(rows["particle"]) > 0).all()
 

@@ -23,9 +23,17 @@ def above(a: wp.vec3, level: float):
     return a[1] - level
 
 
+@ps.law
+def wave(angle: float, level: float):
+    """A law of an angle or a dihedral."""
+    return level * wp.cos(angle)
+
+
 # Arguments that each part can be made with.
 PARTS = {
+    ps.Angles: {"triples": [(0, 1, 2)], "law": wave, "level": 1.0},
     ps.ArtificialViscosity: {"alpha": 0.1, "beta": 0.2},
+    ps.Bonds: {"pairs": [(0, 1)], "law": pull, "strength": 1.0},
     ps.Boundary: {
         "law": above, "friction": 0.1, "restitution": 0.5, "velocity": (0, 1, 0),
         "angular_velocity": (0, 0, 1), "pivot": (0, 1, 0), "drawn": ((0, 0, 0), (1, 1, 1)),
@@ -39,10 +47,14 @@ PARTS = {
     },
     ps.Contact: {"friction": 0.1, "restitution": 0.5, "compliance": 1e-6},
     ps.Coulomb: {"cutoff": 2.0, "damping": 0.1},
+    ps.Dihedrals: {"quadruples": [(0, 1, 2, 3)], "law": wave, "level": 1.0},
     ps.Distance: {"pairs": [(0, 1)], "rest_length": 1.0, "compliance": 0.1, "damping": 0.1,
                   "break_force": 10.0},
     ps.Drag: {"linear": 1.0, "quadratic": 1.0, "flow": (1, 0, 0)},
+    ps.FENEBonds: {"pairs": [(0, 1)], "stiffness": 30.0, "length": 1.5},
     ps.Gravity: {"G": 1.0, "softening": 0.1},
+    ps.HarmonicAngles: {"triples": [(0, 1, 2)], "stiffness": 1.0, "rest_angle": 2.0},
+    ps.HarmonicBonds: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0},
     ps.LennardJones: {"epsilon": 1.0, "sigma": 1.0, "cutoff": 2.5},
     ps.GridField: {"lower": (0, 0, 0), "upper": (1, 1, 1), "spacing": 0.1, "speed": 1.0,
                    "density": 1.0, "damping": 0.1},
@@ -69,6 +81,7 @@ NEVER = {
     (ps.Constraint, "break_force"),
     (ps.Distance, "break_force"),
 }  # may be infinite: unbreakable
+INDICES = {"pairs", "triples", "quadruples", "particles"}
 SIGNED = {"velocity", "angular_velocity", "pivot", "drawn",
           "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
           "periodic", "G"}  # fmt: skip
@@ -114,7 +127,7 @@ def test_what_is_not_finite(part, name, bad):
 
 
 @pytest.mark.parametrize(
-    ("part", "name"), [case for case in CASES if case[1] not in SIGNED | {"pairs", "particles"}]
+    ("part", "name"), [case for case in CASES if case[1] not in SIGNED | INDICES]
 )
 def test_what_is_below_zero(part, name):
     refuses(lambda: part(**{**PARTS[part], name: -1.0}), name)

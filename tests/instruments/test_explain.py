@@ -88,7 +88,7 @@ def test_without_neighbours_there_is_no_list(device):
     assert found.conditional == []
     implicit = {"force_slope", "implicit_force", "velocity_lead"}  # in the velocity, as drag is
     assert set(found.arrays) == COMPENSATED | {"force", "inverse_mass", "mass"} | implicit
-    forces = ["particle_force", "particle_force_and_slope", "spring_force"]
+    forces = ["particle_force", "particle_force_and_slope", "bonded_force"]
     assert kernels(found) == [*3 * ["zero_rows"], *forces, "respond", "advance"]
 
 

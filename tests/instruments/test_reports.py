@@ -35,12 +35,12 @@ def test_markup_is_text():
 def test_diagnostics_show_every_quantity_of_the_first_worlds():
     sim = falling()
     lines = str(sim.diagnostics()).splitlines()
-    assert (
-        lines[0].split() == "mass kinetic potential energy virial momentum angular momentum".split()
-    )
+    heads = "mass kinetic potential energy virial temperature pressure momentum angular momentum"
+    assert lines[0].split() == heads.split()
     numbers = [float(word) for word in lines[2].split()]
     found = sim.diagnostics()
     wanted = [found.mass, found.kinetic, found.potential, found.energy, found.virial]
+    wanted += [found.temperature, found.pressure]
     wanted = np.concatenate([*wanted, found.momentum[0], found.angular_momentum[0]])
     np.testing.assert_allclose(numbers, wanted, rtol=1e-4)  # five digits are shown
     many = str(falling(worlds=25).diagnostics())

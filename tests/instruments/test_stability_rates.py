@@ -10,7 +10,7 @@ import particlesim as ps
 from cases.stability import chain, limit, oscillator, simulation
 from particlesim.engine.limit import Limit, explicit_step
 from particlesim.engine.spectrum import largest
-from particlesim.interactions.springs import spring_bound
+from particlesim.interactions.bonded.harmonic_bonds import spring_bound
 
 
 def dimer(interaction, distance, mass=(1.0, 1.0), **kwargs):

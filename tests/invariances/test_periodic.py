@@ -15,7 +15,16 @@ ROUNDING = 1e4 * EPS * SIDE  # as in test_frames.py, of places as large as the b
 IMAGES = np.random.default_rng(3).integers(-2, 3, (COUNT, 3))
 # They know places, which a box has images of, or a medium.
 FIXED = {"ParticleForce", "ConstantForce", "UniformGravity", "Drag"}
-TIED = {"Gravity", "Springs", "Distance", "Constraint", "ConstraintForce"}  # act at any distance
+TIED = {
+    "Gravity",
+    "Springs",
+    "Bonds",
+    "HarmonicBonds",
+    "Angles",
+    "Distance",
+    "Constraint",
+    "ConstraintForce",
+}  # act at any distance
 
 
 def run(described, frames=12):

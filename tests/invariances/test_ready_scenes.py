@@ -18,6 +18,7 @@ SMALL = {
     "lj_melt": {"cells": 4},
     "phase_transition": {"cells": 4},
     "gas_in_a_box": {"count": 300},
+    "polymer_melt": {"edge": 6},
 }
 FRAMES = 3
 

@@ -46,6 +46,22 @@ def swing_energy(position: wp.vec3):
 
 
 @ps.law
+def morse(distance_squared: float, charge_i: float, depth: float):
+    x = 1.0 - wp.exp(1.0 - distance_squared)
+    return charge_i * depth * x * x
+
+
+@ps.law
+def wave(cosine: float, depth: float):
+    return depth * cosine * cosine
+
+
+@ps.law
+def torsion(dihedral: float, multiplicity: int):
+    return wp.cos(float(multiplicity) * dihedral)
+
+
+@ps.law
 def flat(a: wp.vec3, b: wp.vec3, c: wp.vec3, area: float):
     return 0.5 * wp.length(wp.cross(b - a, c - a)) - area
 
@@ -67,6 +83,11 @@ def forces():
     scene.add_interaction(ps.PairPotential(screened, cutoff=None, screening=1.0, power=-1))
     scene.add_interaction(ps.Gravity(some))
     scene.add_interaction(ps.Springs([(0, 1)], 1.0, 1.0))
+    scene.add_interaction(ps.Bonds([(0, 1)], morse, depth=1.0))
+    scene.add_interaction(ps.FENEBonds([(0, 1)], 1.0, 100.0))
+    scene.add_interaction(ps.Angles([(0, 1, 2)], wave, depth=1.0))
+    scene.add_interaction(ps.HarmonicAngles([(0, 1, 2)], 1.0, 1.0))
+    scene.add_interaction(ps.Dihedrals([(0, 1, 2, 3)], torsion, multiplicity=3))
     scene.add_interaction(ps.UniformGravity())
     scene.add_interaction(ps.Drag(1.0))
     scene.add_interaction(ps.ConstantForce((0, 1, 0)))
@@ -178,6 +199,8 @@ def simulate(name, precision):
     peak = sim.model.array(np.zeros(sim.particle_count), sim.model.precision.scalar)
     sim.frames._record(sim.settings.substeps, peak)
     sample(sim)
+    if all(sim.model.periodic):
+        ps.radial_distribution(sim)
     sim.project(1)
     sim.loop.frame = 1
     sim.rounds.make()

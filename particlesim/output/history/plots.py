@@ -57,6 +57,21 @@ def potential(record: Record) -> Panel:
     return Panel("potential energy", "energy", _family(record, "potential:"))
 
 
+def temperature(record: Record) -> Panel:
+    """2 K / (3 n)."""
+    return Panel("temperature", "energy", _family(record, "temperature"))
+
+
+def pressure(record: Record) -> Panel:
+    """Of a periodic box."""
+    return Panel("pressure", "energy / length³", _family(record, "pressure"))
+
+
+def observed(record: Record) -> Panel:
+    """What the run was asked to observe."""
+    return Panel("observed", "", _family(record, "observed:"))
+
+
 def density(record: Record) -> Panel:
     """Largest and root mean square of rho / rho0 - 1."""
     curves = _family(record, "density_error_")
@@ -72,8 +87,11 @@ def residual(record: Record) -> Panel:
 
 PANELS: dict[str, Callable[[Record], Panel]] = {
     each.__name__: each
-    for each in (energy, drift, momentum, angular_momentum, potential, density, residual)
-}
+    for each in (
+        energy, drift, momentum, angular_momentum, potential, temperature, pressure, density,
+        residual, observed,
+    )
+}  # fmt: skip
 
 
 def plot_history(
@@ -89,7 +107,8 @@ def plot_history(
         history: The file, or what :func:`~particlesim.read_history` made of it.
         path: The picture, ``.png``, ``.svg`` or ``.pdf``.
         what: Of ``"energy"``, ``"drift"``, ``"momentum"``, ``"angular_momentum"``,
-            ``"potential"``, ``"density"``, ``"residual"``; None: all that the history has.
+            ``"potential"``, ``"temperature"``, ``"pressure"``, ``"density"``, ``"residual"``,
+            ``"observed"``; None: all that the history has.
         overwrite: Replace an existing picture.
 
     Returns:

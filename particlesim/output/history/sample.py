@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
+from ... import validate
 from ...engine.loop import Source
 from ...instruments.diagnostics import measure, undisturbed
 from ...instruments.residuals import residuals
 from ...interactions.fluid.sph import SPH
 
+Observed = Mapping[str, Callable[[Any], Any]]
 
-def sample(sim: Source) -> dict[str, np.ndarray]:
-    """One row of a history: name to (worlds,), float64."""
+
+def sample(sim: Source, observe: Observed | None = None) -> dict[str, np.ndarray]:
+    """One row of a history: name to (worlds,), float64; ``observe`` as of ``History``."""
     with undisturbed(sim):
         potentials: list[np.ndarray] = []
         total = measure(sim, potentials)
@@ -22,7 +25,9 @@ def sample(sim: Source) -> dict[str, np.ndarray]:
         for name in ("momentum", "angular_momentum"):
             vectors = getattr(total, name)
             values |= {f"{name}_{axis}": vectors[:, k] for k, axis in enumerate("xyz")}
-        values |= {name: getattr(total, name) for name in ("kinetic", "potential", "energy")}
+        names = ["kinetic", "potential", "energy", "temperature"]
+        names += ["pressure"] if np.isfinite(total.volume).all() else []
+        values |= {name: getattr(total, name) for name in names}
         for label, part, own in zip(
             _labels(sim.interactions), sim.interactions, potentials, strict=True
         ):
@@ -37,7 +42,22 @@ def sample(sim: Source) -> dict[str, np.ndarray]:
             missed = residuals(constraint, sim)
             if missed is not None:
                 values |= _figures("residual", label, np.abs(missed[0]), missed[1], sim)
+        for name, look in (observe or {}).items():
+            values |= _observed(name, look(sim), sim.model.world_count)
     return values
+
+
+def _observed(name: str, found: Any, worlds: int) -> dict[str, np.ndarray]:
+    """A column, or one for each number that a world has."""
+    value = np.asarray(found, dtype=np.float64)
+    if value.shape[:1] != (worlds,) or value.ndim > 2:
+        raise validate.fail(
+            "History", f"observe[{name!r}]", f"give one value a world, ({worlds},)", value.shape,
+            "return an array with a row for each world",
+        )  # fmt: skip
+    if value.ndim == 1:
+        return {f"observed:{name}": value}
+    return {f"observed:{name} {k}": column for k, column in enumerate(value.T)}
 
 
 def _labels(parts: Iterable[Any]) -> list[str]:

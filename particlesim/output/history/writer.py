@@ -23,7 +23,7 @@ import numpy as np
 from ... import validate
 from ...engine.loop import Source
 from .. import files
-from .sample import sample
+from .sample import Observed, sample
 
 SUFFIXES = (".csv", ".jsonl")
 OWN = ("frame", "time", "world")  # what every line starts with
@@ -33,17 +33,20 @@ class History(files.Closing):
     """Records what a simulation did, frame by frame.
 
     Columns: ``mass``, ``momentum_x``, ``angular_momentum_x`` (and y, z), ``kinetic``,
-    ``potential``, ``energy``; ``potential:<interaction>`` of each that has one;
+    ``potential``, ``energy``, ``temperature``, in a periodic box ``pressure`` (see
+    ``Simulation.diagnostics``); ``potential:<interaction>`` of each that has one;
     ``density_error_max:<fluid>`` and ``density_error_rms:<fluid>`` of rho / rho0 - 1, where there
     is a rest density; ``residual_max:<constraint>`` and ``residual_rms:<constraint>`` (see
-    :mod:`particlesim.instruments.residuals`). A run with a history goes as one without, bit for
-    bit.
+    :mod:`particlesim.instruments.residuals`); ``observed:<name>`` of what is observed. A run with
+    a history goes as one without, bit for bit.
 
     Args:
         sim: The simulation.
         path: The file, ``.csv`` or ``.jsonl``.
         overwrite: Replace an existing file.
         resume: Go on with an existing file: frames after the simulation's present one are dropped.
+        observe: Functions by name, of the simulation, that give one number a world, (worlds,), or
+            several, (worlds, k), as ``ps.mean_square_displacement`` does. They look only.
 
     Raises:
         FileExistsError: The file exists, and neither ``overwrite`` nor ``resume`` is set.
@@ -70,8 +73,9 @@ class History(files.Closing):
         *,
         overwrite: bool = False,
         resume: bool = False,
+        observe: Observed | None = None,
     ):
-        self.sim = sim
+        self.sim, self.observe = sim, dict(observe or {})
         self.path = files.check_new("History", path, overwrite or resume, suffixes=SUFFIXES)
         self.overwrite = overwrite and not resume
         self._file: io.FileIO | None = None
@@ -86,7 +90,7 @@ class History(files.Closing):
             OSError: The file could not be written; what it held before is kept.
         """
         sim = self.sim
-        values = sample(sim)
+        values = sample(sim, self.observe)
         if self._file is None:
             self._begin([*OWN, *values])
         table = np.array(list(values.values()), dtype=np.float64)

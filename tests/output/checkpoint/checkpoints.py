@@ -18,6 +18,7 @@ SMALL = {
     "freezing": {"cells": 5},
     "lj_melt": {"cells": 4},
     "phase_transition": {"cells": 4},
+    "polymer_melt": {"edge": 6},
     "gas_in_a_box": {"count": 400},
     "pile": {"count": 100},
 }

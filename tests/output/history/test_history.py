@@ -32,6 +32,25 @@ def test_a_history_is_the_diagnostics(tmp_path, suffix):
     np.testing.assert_array_equal(record["potential:Springs"], record["potential"])
 
 
+def test_what_is_observed_is_recorded(tmp_path, refused):
+    scene = ps.Scene(periodic=((0, 0, 0), (2, 2, 2)))
+    scene.add_particles([(0, 0, 0), (1, 1, 1)], velocity=[(3, 0, 0), (0, 4, 0)])
+    observe = {
+        "msd": ps.mean_square_displacement,
+        "g": lambda sim: ps.radial_distribution(sim, bins=2, reach=1.0).value,
+    }
+    sim = ps.Simulation(scene, ps.Settings(dt=0.5, precision="float64"), worlds=2, device="cpu")
+    sim.run(4, history=tmp_path / "out.csv", observe=observe)
+    record = read_history(tmp_path / "out.csv")
+    squares = 12.5 * (0.5 * np.arange(5)) ** 2
+    np.testing.assert_allclose(record["observed:msd"], np.stack([squares] * 2, 1), rtol=1e-14)
+    assert record["observed:g 1"].shape == (5, 2)
+    np.testing.assert_allclose(record["temperature"], 25 / 6, rtol=1e-14)
+    np.testing.assert_allclose(record["pressure"], 25 / 24, rtol=1e-14)
+    with refused(r"observe\['one'\] must give one value a world, \(2,\), got"):
+        History(sim, tmp_path / "other.csv", observe={"one": lambda sim: 1.0}).write()
+
+
 def test_files_are_what_other_programs_read(tmp_path):
     sim = oscillation(worlds=2)
     for name in ("out.csv", "out.jsonl"):

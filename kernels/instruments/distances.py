@@ -1,0 +1,45 @@
+"""How often particles are how far from each other."""
+
+import functools
+
+import warp as wp
+
+from ..engine.integrate import widened
+from ..engine.loops import Periodicity, box_type, minimum_image
+from ..precision import Precision, register
+
+
+@functools.cache
+def distances_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
+    """Kernel: counts the particles within reach of each centre by their distance, in bins.
+
+    Particles of a world follow each other in ``others``; a particle is not counted about itself.
+    """
+    vec3, Box = precision.vec3, box_type(precision)
+    image, wide = minimum_image(precision, periodic), widened(precision)
+
+    @register
+    def count_distances(
+        first: int,
+        centres: wp.array(dtype=wp.int32),
+        world: wp.array(dtype=wp.int32),  # of each centre
+        others: wp.array(dtype=wp.int32),
+        begin: wp.array(dtype=wp.int32),  # of each world's among them, and at the end their number
+        box: wp.array(dtype=Box),
+        x: wp.array(dtype=vec3),
+        reach: wp.float64,
+        count_io: wp.array2d(dtype=wp.int64),
+    ):
+        k = first + wp.tid()
+        i = centres[k]
+        w = world[k]
+        bins = count_io.shape[1]
+        for n in range(begin[w], begin[w + 1]):
+            j = others[n]
+            d = wide(image(x[j] - x[i], box[w]))
+            r2 = wp.dot(d, d)
+            if j != i and r2 < reach * reach:
+                b = int(wp.sqrt(r2) / reach * wp.float64(bins))
+                wp.atomic_add(count_io, w, wp.min(b, bins - 1), wp.int64(1))
+
+    return count_distances

@@ -1,0 +1,1 @@
+"""Forces of bonds, angles and dihedrals: laws of given tuples of particles."""

@@ -1,0 +1,12 @@
+"""What is of one machinery is tried by its kin in every run, and itself in the long one."""
+
+import pytest
+
+KIN = {"HarmonicBonds": "Springs", "FENEBonds": "Bonds", "HarmonicAngles": "Angles"}
+
+
+@pytest.hookimpl(tryfirst=True)  # before those that are marked are left out
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if "name" in getattr(item, "fixturenames", ()) and item.callspec.params["name"] in KIN:
+            item.add_marker(pytest.mark.slow)
