@@ -94,7 +94,8 @@ def test_rooms_are_few_and_small():
     assert len(inside) <= 3, inside
     for folder in {path.parent for path in FILES.values()}:
         modules = list(folder.glob("*.py"))
-        assert len(modules) <= 15, f"{folder} holds {len(modules)} files"
+        most = 40 if folder.name == "scenes" else 15  # a catalogue, and rooms
+        assert len(modules) <= most, f"{folder} holds {len(modules)} files"
     for path in itertools.chain(FILES.values(), (ROOT / "tests").rglob("*.py")):
         text = path.read_text(encoding="utf-8")
         assert text.count("\n") <= 300, f"{path} has {text.count(chr(10))} lines"
