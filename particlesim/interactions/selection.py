@@ -134,7 +134,7 @@ class Chosen:
             self.kind_of = model.array(np.concatenate(kinds), model.precision.scalar)
             self.held["kind"] = pairs.hold(self.kind_of)
         rows = _partners(model, topology.merged(
-            self.owner, "exclude", model, [peer.chosen._pairs() for peer in peers]
+            self.owner, "exclude", model, [peer.chosen.excluded() for peer in peers]
         ))  # fmt: skip
         most = rows.shape[1]
         if most:
@@ -173,7 +173,7 @@ class Chosen:
             result[rows] = k
         return result
 
-    def _pairs(self) -> np.ndarray:
+    def excluded(self) -> np.ndarray:
         """Excluded pairs of a scene, (m, 2)."""
         found = [np.zeros((0, 2), dtype=np.int64)]
         for each in self.exclude:

@@ -89,6 +89,28 @@ def test_forces_are_those_of_all_images(options, device):
     assert sim.diagnostics().potential[0] == pytest.approx(U, rel=allowed)
 
 
+def test_bonded_charges_do_not_feel_each_other():
+    """As of all images, less the law of the pairs themselves: to the tolerance of both sums."""
+    pairs = np.array([(0, 1), (1, 2), (10, 30)])
+    tolerance = 1e-9
+    sim = simulate(salt(tolerance=tolerance, cutoff=2.5, exclude=pairs))
+    scene = sim.scenes[0]
+    x, q, box = scene.position, scene.column("charge"), np.array([6.0, 7.0, 8.0])
+    U, F = images(x, q, box)
+    for i, j in pairs:
+        d = x[i] - x[j]
+        d -= box * np.round(d / box)
+        r = np.linalg.norm(d)
+        U -= q[i] * q[j] / r
+        F[i] -= q[i] * q[j] * d / r**3
+        F[j] += q[i] * q[j] * d / r**3
+    allowed = 10 * tolerance
+    np.testing.assert_allclose(sim.get("force"), F, rtol=0, atol=allowed * np.abs(F).max())
+    found = sim.diagnostics()
+    assert found.potential[0] == pytest.approx(U, rel=allowed)
+    assert found.virial[0] == pytest.approx(U, rel=allowed)
+
+
 @pytest.mark.slow
 def test_a_world_goes_as_it_goes_alone(device):
     """Boxes and charges of their own."""

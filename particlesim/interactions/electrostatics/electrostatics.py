@@ -16,13 +16,21 @@ from ...engine.probe import Probe
 from ...engine.state import State
 from ...kernels.interactions.charges import charge_kernels
 from ...scene.group import select
+from ...scene.law import law
 from ...scene.part import Interaction
+from ..bonded.bonds import Bonds
 from ..pair_limits import collisions
 from ..potentials.coulomb import Coulomb
 from .splitting import split
 from .waves import Waves
 
 METHODS = ("all_pairs", "damped_shifted_force", "ewald")
+
+
+@law
+def _of_waves(r: float, charge_i: float, charge_j: float, constant: float, damping: float):
+    """What waves have of a pair."""
+    return -(constant * charge_i) * charge_j * wp.erf(damping * r) / r
 
 
 class Electrostatics(Interaction):
@@ -47,6 +55,7 @@ class Electrostatics(Interaction):
         cutoff: Of near pairs [length], for the last two; with ``"ewald"`` None: what costs least.
         damping: a [1/length], of ``"damped_shifted_force"``.
         tolerance: Of ``"ewald"``: what both sums may leave out, in parts.
+        exclude: Pairs that do not feel each other, as of ``Pair``; their images do.
 
     Raises:
         ValueError: An open axis with ``"ewald"``, a cutoff where none is taken or the reverse.
@@ -67,6 +76,7 @@ class Electrostatics(Interaction):
         cutoff: float | None = None,
         damping: float = 0.0,
         tolerance: float = 1e-6,
+        exclude: Any = None,
     ):
         self.method = validate.choice(self.name, "method", method, METHODS)
         self.group, self.constant = group, validate.number(self.name, "constant", constant)
@@ -82,8 +92,8 @@ class Electrostatics(Interaction):
                 "it is for 'damped_shifted_force'",
             )  # fmt: skip
         self.requires = frozenset({"force", "charge"})
-        self.cutoff = cutoff
-        self.pairs = Coulomb(group, constant, cutoff, damping)
+        self.cutoff, self.exclude = cutoff, exclude
+        self.pairs = Coulomb(group, constant, cutoff, damping, exclude=exclude)
 
     def kind(self) -> tuple[Any, ...]:
         return (type(self), self.method, *self.pairs.kind())
@@ -95,17 +105,22 @@ class Electrostatics(Interaction):
             pairs = self._split(model)
         self.near = pairs[0].bind(pairs)
         self.near.prepare(model, neighbors)
+        if self.waves:
+            self.left_out.prepare(model, neighbors)
 
     def _split(self, model: Model) -> list[Coulomb]:
         """Waves of every world, and its near pairs."""
-        parts, pairs = [], []
+        parts, pairs, left_out = [], [], []
         for w, peer in enumerate(self.peers):
             parts.append(select(model.scenes[w], peer.group, self.name))
             box = model.box_length[w]
             found = split(np.where(box > 0, box, 1.0), len(parts[w]), peer.tolerance, peer.cutoff)
             self.waves.append(Waves(self.name, model, w, found))
             given = peer.group, peer.constant, found.cutoff, found.damping
-            pairs.append(Coulomb(*given, truncation="cut"))
+            pairs.append(Coulomb(*given, truncation="cut", exclude=peer.exclude))
+            law_of = {"constant": peer.constant, "damping": found.damping}
+            left_out.append(Bonds(pairs[-1].chosen.excluded(), _of_waves, **law_of))
+        self.left_out = left_out[0].bind(left_out)
         member = np.zeros(model.particle_count)
         member[np.concatenate([rows + model.offsets[w] for w, rows in enumerate(parts)])] = 1.0
         precision, device = model.precision, model.device
@@ -121,6 +136,8 @@ class Electrostatics(Interaction):
 
     def attach(self, model: Model, state: State) -> None:
         self.near.attach(model, state)
+        if self.waves:
+            self.left_out.attach(model, state)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         self.near.apply(state, neighbors, dt)
@@ -128,6 +145,7 @@ class Electrostatics(Interaction):
             self._waves(state)
             inputs = [self.constants, self.world, self.field, state.force]
             launch(self._kernels.force, len(self.taken), inputs, self.model.device)
+            self.left_out.apply(state, neighbors, dt)
 
     def _waves(self, state: State) -> None:
         inputs = [state.charge, self.member, self.taken]
@@ -160,7 +178,8 @@ class Electrostatics(Interaction):
             self.near.measure(state, energy, virial)
             return
         near, unused = (wp.zeros_like(energy) for _ in range(2))
-        self.near.measure(state, near, unused)
+        for part in (self.near, self.left_out):
+            part.measure(state, near, unused)
         self._waves(state)
         raw, own = self.energies
         for each in self.waves:
