@@ -22,7 +22,7 @@ from .instruments.watchdog.incident import Incident, SimulationError, Simulation
 from .interactions.fluid.equations_of_state import EquationOfState, Polytrope, Tait
 from .interactions.fluid.sph import SPH
 from .interactions.fluid.viscosities import ArtificialViscosity, Viscosity
-from .interactions.gravity import Gravity
+from .interactions.gravity.gravity import Gravity
 from .interactions.lennard_jones import LennardJones
 from .interactions.pair import PairForce, PairPotential
 from .interactions.pair_sum import PairSum

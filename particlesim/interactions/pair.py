@@ -44,6 +44,8 @@ class Pair(Interaction):
             quantities of the two particles, named ``mass_i``, ``charge_j`` and so on.
     """
 
+    listed = True  # sums over a list of pairs, in one pass with others that share it
+
     def __init__(
         self,
         potential: Law | None,
