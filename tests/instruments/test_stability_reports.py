@@ -16,6 +16,8 @@ from particlesim.instruments.stability import StabilityWarning
 SMALL = {
     "dam_break": {"spacing": 0.05},
     "star_collision": {"count": 150},
+    "plummer_sphere": {"count": 300},
+    "galaxy_collision": {"count": 300},
     "freezing": {"cells": 5},
     "gas_in_a_box": {"count": 400},
 }

@@ -14,6 +14,8 @@ from particlesim.commands.scene_files import ready_scenes
 SMALL = {
     "dam_break": {"spacing": 0.06},
     "star_collision": {"count": 120},
+    "plummer_sphere": {"count": 240},
+    "galaxy_collision": {"count": 240},
     "freezing": {"cells": 5},
     "gas_in_a_box": {"count": 300},
 }

@@ -95,6 +95,21 @@ def test_a_uniform_sphere_holds_three_fifths(device):
     assert found.virial[0] == pytest.approx(found.potential[0], rel=1e-12)
 
 
+@pytest.mark.parametrize("angle", [None, 0.5])
+def test_plummer_sphere(angle, device):
+    # U = -3 pi / 32 G M^2 / a. Of n points the sum lacks each one's own cell, n^(-2/3) of it, and
+    # scatters by 1 / sqrt(n) as directions are random.
+    n = 4000
+    scene = ps.Scene()
+    scene.add_particles(ps.sample.plummer((0, 0, 0), 1.0, n), mass=1 / n)
+    scene.add_interaction(ps.Gravity(G=1.0))
+    settings = ps.Settings(precision="float64", opening_angle=angle)
+    found = ps.Simulation(scene, settings, device=device).diagnostics()
+    within = n ** (-2 / 3) + 1 / np.sqrt(n)
+    assert found.potential[0] == pytest.approx(-3 * np.pi / 32, rel=within)
+    assert found.virial[0] == pytest.approx(found.potential[0], rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("mass", "distance"), [(5.972e24, 1.496e11), (700.0, 2.4e13), (1e21, 1.3e14)]
 )
