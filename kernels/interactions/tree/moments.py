@@ -7,7 +7,7 @@ import numpy as np
 import warp as wp
 
 from ...precision import Precision, function, register
-from .nodes import CELL, MASS, RADIUS, SECOND, SOFTENING, tree_type
+from .nodes import CELL, LEAF, MASS, RADIUS, SECOND, SOFTENING, tree_type
 
 
 def _of_leaf(precision: Precision) -> wp.Function:
@@ -48,14 +48,15 @@ def _of_leaf(precision: Precision) -> wp.Function:
 
 
 def _of_two(precision: Precision) -> wp.Function:
-    """``two(node, below, tree)``: sum up the two nodes below one."""
+    """``two(node, tree)``: sum up the two nodes below one."""
     real, vec3, Tree = precision.scalar, precision.vec3, tree_type(precision)
     Cell, Corners = precision.vector(CELL), precision.vector(6)
     add_square = _adding_square(precision)
 
-    def two(node: int, below: int, tree: Tree):
-        l, r = tree.cell[below], tree.cell[below + 1]
-        of_l, of_r = tree.box[below], tree.box[below + 1]
+    def two(node: int, tree: Tree):
+        upper = tree.next[node + 1]
+        l, r = tree.cell[node + 1], tree.cell[upper]
+        of_l, of_r = tree.box[node + 1], tree.box[upper]
         q, box = Cell(), Corners()
         m = l[MASS] + r[MASS]
         right = wp.where(m > real(0.0), r[MASS] / m, real(0.5))
@@ -128,12 +129,11 @@ def moment_kernels(precision: Precision) -> SimpleNamespace:
 
     @register
     def sum_up(first: int, start: int, tree: Tree):
-        node = start + first + wp.tid()
-        below = tree.left[node]
-        if below < 0:
+        node = tree.by_level[start + first + wp.tid()]
+        if tree.end[node] - tree.begin[node] <= LEAF:
             leaf(node, tree)
         else:
-            two(node, below, tree)
+            two(node, tree)
 
     @register
     def measure(first: int, tree: Tree):

@@ -2,7 +2,9 @@
 
 Bodies stand in *slots*, in an order in which the bodies of every node follow each other. A node is
 halved at its median body, so which slots it has, and which nodes are below it, is known from the
-number of bodies alone and never changes; what changes is which body stands in which slot.
+number of bodies alone and never changes; what changes is which body stands in which slot. Nodes
+are in the order of a walk that opens all: the lower half of node k is k + 1, the upper the next of
+that.
 """
 
 from typing import Any
@@ -29,8 +31,8 @@ def tree_type(precision: Precision) -> Any:
     fields = {
         "begin": integers,  # node -> first slot
         "end": integers,  # node -> last slot + 1
-        "left": integers,  # node -> first of the two below it, or -1
         "next": integers,  # node -> where a walk goes on that does not open it, or -1
+        "by_level": integers,  # the nodes, those of a level together
         "world": integers,  # node -> world
         "root": integers,  # world -> node
         "group": integers,  # group -> node

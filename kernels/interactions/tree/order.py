@@ -13,7 +13,7 @@ import warp as wp
 
 from ...native import body
 from ...precision import Precision, native, register
-from .nodes import tree_type
+from .nodes import LEAF, tree_type
 
 FEW = 48  # bodies that are sorted by insertion
 
@@ -23,9 +23,9 @@ def _native(precision: Precision, name: str) -> wp.Function:
     arrays = {
         "x": "position", "int* by": "by_io", "unsigned* key": "keys", "int* spare": "spares",
         "int* side": "sides", "int* begin": "tree.begin", "int* end": "tree.end",
-        "int* left": "tree.left", "int* root": "tree.root", "int* member": "members",
+        "int* by_level": "tree.by_level", "int* root": "tree.root", "int* member": "members",
     }  # fmt: skip
-    snippet = body(f"interactions/tree/{name}.cpp", precision, {"FEW": FEW}, arrays)
+    snippet = body(f"interactions/tree/{name}.cpp", precision, {"FEW": FEW, "LEAF": LEAF}, arrays)
 
     def act(
         k: int, slots: int, tree: tree_type(precision), members: wp.array(dtype=wp.int32),
@@ -95,10 +95,8 @@ def sorted_kernels(precision: Precision) -> SimpleNamespace:
                 longest = size
                 axis = k
         to = a
-        if tree.left[node] >= 0:
-            middle = tree.begin[tree.left[node] + 1]
-            if i >= middle:
-                to = middle
+        if b - a > LEAF and i >= tree.end[node + 1]:
+            to = tree.end[node + 1]
         side_out[by[2 * slots * axis + i]] = to
 
     @register
@@ -109,8 +107,8 @@ def sorted_kernels(precision: Precision) -> SimpleNamespace:
     @register
     def descend(first: int, tree: Tree, at_io: integers):
         i = first + wp.tid()
-        below = tree.left[at_io[i]]
-        if below >= 0:
-            at_io[i] = wp.where(i < tree.begin[below + 1], below, below + 1)
+        node = at_io[i]
+        if tree.end[node] - tree.begin[node] > LEAF:
+            at_io[i] = wp.where(i < tree.end[node + 1], node + 1, tree.next[node + 1])
 
     return SimpleNamespace(coordinates=coordinates, halves=halves, keys=keys, descend=descend)

@@ -1,7 +1,9 @@
-// The bodies of node k, halved. What stands before it (see order.py) names the arrays.
+// The bodies of the k-th node by level, halved. What stands before it (see order.py) names the
+// numbers (real, LEAF bodies at most of a node that is not) and the arrays.
 
-if (left[k] < 0) return;
-const int a = begin[k], b = end[k], mid = begin[left[k] + 1];
+const int node = by_level[k], a = begin[node], b = end[node];
+if (b - a <= LEAF) return;
+const int mid = end[node + 1];
 const long long stride = 2ll * slots;
 int axis = 0;
 float longest = -1;

@@ -9,6 +9,7 @@ from ...precision import Precision, function
 from .nodes import (
     CELL,
     FORCE,
+    LEAF,
     MASS,
     RADIUS,
     SECOND,
@@ -86,16 +87,18 @@ def plain_walk(precision: Precision, what: str, own: bool) -> wp.Function:
             center = vec3(q[0], q[1], q[2])
             away = center - middle
             gap = wp.max(wp.max(away, -away) - half, vec3())
-            below = tree.left[node]
+            a, b = tree.begin[node], tree.end[node]
+            to = node + 1
             if wp.dot(gap, gap) * p.opening_squared > q[RADIUS] + q[SOFTENING]:
-                below = int(-1)
+                to = tree.next[node]
                 total += of_cell(q, scale * center - x, softening + q[SOFTENING] * area, area)
-            elif below < 0:
-                for j in range(tree.begin[node], tree.end[node]):
+            elif b - a <= LEAF:
+                to = tree.next[node]
+                for j in range(a, b):
                     d = scale * vec3(tree.x[0, j], tree.x[1, j], tree.x[2, j]) - x
                     s2 = softening + tree.x[4, j] * area
                     total += of_body(tree.x[3, j], d, s2, j == row, p.closest_squared * area)
-            node = wp.where(below < 0, tree.next[node], below)
+            node = to
         i = tree.order[row]
         given = unit * wp.float64(tree.x[3, row] * scale)
         if wp.static(forces):

@@ -1,7 +1,8 @@
 // What the bodies of group c feel of all others. What stands before it (see walk.py) names the numbers
 // (real, W lanes of a vector, GROUP bodies at most, SUMS of each, AT_ONCE bodies served together, LIST
-// entries that are summed at a time, CELL numbers of a cell, OWN: each body has a softening of its
-// own, MEASURE: potential and virial are summed in place of the pull) and the arrays; STORE ends it.
+// entries that are summed at a time, CELL numbers of a cell, LEAF bodies of a node that is not halved,
+// OWN: each body has a softening of its own, MEASURE: potential and virial are summed in place of the
+// pull) and the arrays; STORE ends it.
 
 typedef real V __attribute__((vector_size(W * sizeof(real))));
 
@@ -112,7 +113,7 @@ for (int node = root[world[g]]; node >= 0;) {
         cell[S][cells] = q[SOFTENING] * area;
         if (++cells == LIST) sum_up(cell, cells, of_cells);
         node = next[node];
-    } else if (left[node] < 0) {
+    } else if (end[node] - begin[node] <= LEAF) {
         const int b = begin[node], n = end[node] - b;
         if (bodies + n > LIST) sum_up(body, bodies, of_bodies);
         for (int k = 0; k < n; ++k) body[X][bodies + k] = px[b + k] * scale;
@@ -124,7 +125,7 @@ for (int node = root[world[g]]; node >= 0;) {
         bodies += n;
         node = next[node];
     } else {
-        node = left[node];
+        ++node;
     }
 }
 if (cells) sum_up(cell, cells, of_cells);

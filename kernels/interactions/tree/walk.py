@@ -20,7 +20,18 @@ from ...engine.packed import FLAGS
 from ...native import body
 from ...precision import Precision, native, register
 from ...warp_internals import columns
-from .nodes import CELL, FORCE, GROUP, MEASURE, RADIUS, SOFTENING, gravity_type, out_type, tree_type
+from .nodes import (
+    CELL,
+    FORCE,
+    GROUP,
+    LEAF,
+    MEASURE,
+    RADIUS,
+    SOFTENING,
+    gravity_type,
+    out_type,
+    tree_type,
+)
 from .plain_walk import plain_walk
 
 LIST = 512  # entries of a list that are summed at a time
@@ -66,12 +77,12 @@ def _native(precision: Precision, what: str, own: bool) -> wp.Function:
     numbers = {
         "W": lane_count(precision), "GROUP": GROUP, "LIST": LIST, "CELL": CELL, "OWN": own,
         "MEASURE": what == MEASURE, "SUMS": 2 if what == MEASURE else 3, "AT_ONCE": 4,
-        "RADIUS": RADIUS, "SOFTENING": SOFTENING,
+        "LEAF": LEAF, "RADIUS": RADIUS, "SOFTENING": SOFTENING,
     }  # fmt: skip
     arrays = {
         "x": "tree.x", "cell_of": "tree.cell", "boxes": "tree.box", "scales": "tree.scale",
         **{f"int* {name}": f"tree.{name}" for name in
-           ("begin", "end", "left", "next", "world", "root", "group", "order")},
+           ("begin", "end", "next", "world", "root", "group", "order")},
         **({"f": "o.f"} if what == FORCE else
            {"double* energy": "o.energy", "double* virial": "o.virial"}),
     }  # fmt: skip

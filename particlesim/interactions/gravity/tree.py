@@ -59,22 +59,23 @@ class Tree:
         self.order = make(model, members, self.levels, self.data) if self.count else None
 
     def _nodes(self) -> tuple[list[tuple[int, int]], Any]:
-        """First node and number of nodes of each level, and what is known of the nodes."""
+        """First entry of ``by_level`` and how many, for each level; and what is known of nodes."""
         model = self.model
-        begin, end, left, after, world, root, levels = _halves(model, self.members)
-        size = end - begin
-        # The largest nodes that are small enough, each the only one of its bodies.
-        parent = np.full(len(begin), -1)
-        inner = np.nonzero(left >= 0)[0]
-        parent[left[inner]] = parent[left[inner] + 1] = inner
-        large = (parent < 0) | (size[parent] > nodes.GROUP)
-        group = np.nonzero((size <= nodes.GROUP) & large)[0]
-        group = group[np.argsort(begin[group])]
+        begin, end, world, level = _halves(model, self.members)
+        # The nodes of a world that none below the same slots is before: its root; and likewise the
+        # largest that are small enough for a group.
+        small = np.nonzero(end - begin <= nodes.GROUP)[0]
+        group, top = small[_first(begin[small], end[small])], np.nonzero(_first(begin, end))[0]
+        root = np.full(model.world_count, -1)
+        root[world[top]] = top
+        after = np.searchsorted(begin, end)
+        after[end == end[root[world]]] = -1
         precision, device = model.precision, model.device
         data = nodes.tree_type(precision)()
         known = {
-            "begin": begin, "end": end, "left": left, "next": after, "world": world, "root": root,
-            "group": group, "group_of": np.repeat(np.arange(len(group)), size[group]),
+            "begin": begin, "end": end, "next": after, "world": world, "root": root,
+            "by_level": np.argsort(level, kind="stable"), "group": group,
+            "group_of": np.repeat(np.arange(len(group)), (end - begin)[group]),
         }  # fmt: skip
         for name, values in known.items():
             setattr(data, name, model.array(values, wp.int32))
@@ -85,7 +86,8 @@ class Tree:
         data.box = wp.zeros(len(begin), dtype=precision.vector(6), device=device)
         data.scale = wp.zeros(model.world_count, dtype=precision.scalar, device=device)
         self.group_count, self.worlds = len(group), world
-        return levels, data
+        counts = np.bincount(level)
+        return list(zip(np.cumsum(counts) - counts, counts, strict=True)), data
 
     def build(self, state: State) -> None:
         """Order the bodies as they are placed now, and sum up the moments of all nodes."""
@@ -135,8 +137,8 @@ class Tree:
         """Of every two bodies in a leaf their mass, and the square of their softened distance;
         as last built.
         """
-        begin, end, left = (getattr(self.data, k).numpy() for k in ("begin", "end", "left"))
-        leaf = np.nonzero((self.worlds == world) & (left < 0))[0]
+        begin, end = self.data.begin.numpy(), self.data.end.numpy()
+        leaf = np.nonzero((self.worlds == world) & (end - begin <= nodes.LEAF))[0]
         i, j = np.triu_indices(nodes.LEAF, 1)
         first, second = begin[leaf, None] + i, begin[leaf, None] + j
         there = second < end[leaf, None]
@@ -147,25 +149,25 @@ class Tree:
         return (a[3] + b[3]) * self.model.mass_unit, np.where(r2 > 0, r2 + s2, np.inf)
 
 
-def _halves(model: Model, members: np.ndarray) -> tuple[Any, ...]:
-    """The nodes of all worlds, level by level: ``begin, end, left, next, world, root, levels``."""
+def _halves(model: Model, members: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The nodes of all worlds, each before those below it: ``begin, end, world, level``."""
     edges = np.searchsorted(model.world_of[members], np.arange(model.world_count + 1))
     world = np.nonzero(np.diff(edges))[0]
-    root = np.full(model.world_count, -1)
-    root[world] = np.arange(len(world))
-    begin, end, after = edges[world], edges[world + 1], np.full(len(world), -1)
-    levels, found, first = [], [], 0
+    begin, end, level = edges[world], edges[world + 1], np.zeros(len(world), int)
+    found = [(begin, end, world, level)]
     while len(begin):
-        levels.append((first, len(begin)))
         halved = end - begin > nodes.LEAF
-        left = np.full(len(begin), -1)
-        first += len(begin)
-        left[halved] = first + 2 * np.arange(halved.sum())
-        found.append((begin, end, left, after, world))
         a, b = begin[halved], end[halved]
         middle = a + (b - a) // 2  # wherever the world begins
-        begin, end = (np.stack(each, axis=1).ravel() for each in ((a, middle), (middle, b)))
-        after = np.stack([left[halved] + 1, after[halved]], axis=1).ravel()
-        world = np.repeat(world[halved], 2)
-    columns = [np.concatenate(each) for each in zip(*found, strict=True)] or [np.zeros(0, int)] * 5
-    return *columns, root, levels
+        begin, end = np.append(a, middle), np.append(middle, b)
+        world, level = np.tile(world[halved], 2), np.tile(level[halved] + 1, 2)
+        found.append((begin, end, world, level))
+    columns = [np.concatenate(each) for each in zip(*found, strict=True)]
+    order = np.lexsort((columns[3], columns[0]))
+    return tuple(each[order] for each in columns)
+
+
+def _first(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Whether none of those before has the same slots."""
+    before = np.append(0, np.maximum.accumulate(end)[:-1])[: len(end)]
+    return begin >= before
