@@ -18,13 +18,16 @@ DISC, LENGTH, THICKNESS, Q = 0.2, 0.5, 0.05, 1.5  # part of the mass; scales; sp
 FARTHEST, EDGE = 5.0, 8.0  # of the disc, in its lengths; of the halo
 
 
-def build(count: int = 50_000, separation: float = 12.0, pericentre: float = 1.5) -> ps.Scene:
+def build(
+    count: int = 50_000, separation: float = 12.0, pericentre: float = 1.5, softening: float = 0.05
+) -> ps.Scene:
     """Two galaxies on their way towards each other.
 
     Args:
         count: Bodies of both, two fifths of them in the discs.
         separation: Of the centres.
         pericentre: Distance at which two points would pass.
+        softening: Of each body.
     """
     scene = ps.Scene(up_axis="z")
     # A parabola of masses 1 and 1: v^2 = 2 G 2 / r, and v_t r = sqrt(2 G 2 r_p).
@@ -43,7 +46,7 @@ def build(count: int = 50_000, separation: float = 12.0, pericentre: float = 1.5
                 velocity=speed + ps.sample.rotate(v, axis, tilt, origin),
                 mass=mass / len(x), radius=0.02, group=f"{name} {part}",
             )  # fmt: skip
-    scene.add_interaction(ps.Gravity(G=1.0, softening=0.05))
+    scene.add_interaction(ps.Gravity(G=1.0, softening=softening))
     return scene
 
 

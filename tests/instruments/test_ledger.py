@@ -13,7 +13,7 @@ SMALL = {
     "dam_break": {"spacing": 0.05},
     "star_collision": {"count": 150},
     "plummer_sphere": {"count": 300},
-    "galaxy_collision": {"count": 300},
+    "galaxy_collision": {"count": 300, "softening": 0.2},
     "freezing": {"cells": 5},
     "gas_in_a_box": {"count": 400},
     "pile": {"count": 100},

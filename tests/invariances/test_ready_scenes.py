@@ -15,7 +15,7 @@ SMALL = {
     "dam_break": {"spacing": 0.06},
     "star_collision": {"count": 120},
     "plummer_sphere": {"count": 240},
-    "galaxy_collision": {"count": 240},
+    "galaxy_collision": {"count": 240, "softening": 0.2},
     "freezing": {"cells": 5},
     "gas_in_a_box": {"count": 300},
 }

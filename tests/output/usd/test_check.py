@@ -19,7 +19,7 @@ SMALL = {
     "dam_break": {"spacing": 0.1},
     "star_collision": {"count": 50},
     "plummer_sphere": {"count": 100},
-    "galaxy_collision": {"count": 100},
+    "galaxy_collision": {"count": 100, "softening": 0.2},
     "freezing": {"cells": 4},
     "gas_in_a_box": {"count": 50},
 }
