@@ -113,12 +113,14 @@ def test_plummer_sphere(angle, device):
 @pytest.mark.parametrize(
     ("mass", "distance"), [(5.972e24, 1.496e11), (700.0, 2.4e13), (1e21, 1.3e14)]
 )
-def test_the_sun_in_single_precision(mass, distance, device):
+@pytest.mark.parametrize("angle", [None, 0.5])
+def test_the_sun_in_single_precision(mass, distance, angle, device):
     """Products of masses and powers of distances leave its range; force and energy do not."""
     scene = ps.Scene()
     scene.add_particles([(0, 0, 0), (distance, 0, 0)], mass=[1.989e30, mass])
     scene.add_interaction(ps.Gravity(G=6.6743e-11))
-    sim = ps.Simulation(scene, ps.Settings(precision="float32"), device=device)
+    settings = ps.Settings(precision="float32", opening_angle=angle)
+    sim = ps.Simulation(scene, settings, device=device)
     energy = 6.6743e-11 * 1.989e30 * mass / distance
     few = 10 * float(np.finfo(np.float32).eps)
     np.testing.assert_allclose(sim.get("force")[:, 0], np.array([1, -1]) * energy / distance, few)

@@ -3,7 +3,6 @@
 import functools
 from types import SimpleNamespace
 
-import numpy as np
 import warp as wp
 
 from ...precision import Precision, function, register
@@ -20,22 +19,20 @@ def _of_leaf(precision: Precision) -> wp.Function:
         a, b = tree.begin[node], tree.end[node]
         q, box = Cell(), Corners()
         o = vec3(tree.x[0, a], tree.x[1, a], tree.x[2, a])
-        m, to, s = real(0.0), vec3(), real(0.0)
-        low, high = o + vec3(), o + vec3()  # copies: a name alone would be o itself
+        c, low, high = o + vec3(), o + vec3(), o + vec3()  # copies: a name alone would be o itself
         for i in range(a, b):
             x = vec3(tree.x[0, i], tree.x[1, i], tree.x[2, i])
-            m += tree.x[3, i]
-            to += tree.x[3, i] * (x - o)
-            s += tree.x[3, i] * tree.x[4, i]
+            q[MASS] += tree.x[3, i]
             low = wp.min(low, x)
             high = wp.max(high, x)
-        over = wp.where(m > real(0.0), real(1.0) / m, real(0.0))
-        c = o + over * to
-        q[MASS] = m
-        q[SOFTENING] = over * s
+        m = wp.where(q[MASS] > real(0.0), q[MASS], real(1.0))
+        for i in range(a, b):
+            part = tree.x[3, i] / m
+            c += part * (vec3(tree.x[0, i], tree.x[1, i], tree.x[2, i]) - o)
+            q[SOFTENING] += part * tree.x[4, i]
         for i in range(a, b):
             y = vec3(tree.x[0, i], tree.x[1, i], tree.x[2, i]) - c
-            q = add_square(q, over * tree.x[3, i], y)
+            q = add_square(q, tree.x[3, i] / m, y)
             q[RADIUS] = wp.max(q[RADIUS], wp.dot(y, y))
         for k in range(3):
             q[k] = c[k]
@@ -101,20 +98,18 @@ def _adding_square(precision: Precision) -> wp.Function:
 
 @functools.cache
 def moment_kernels(precision: Precision) -> SimpleNamespace:
-    """Kernels: ``fill`` the planes by slot, ``sum_up`` the nodes of a level, ``measure`` roots.
+    """Kernels: ``fill`` the planes by slot, ``sum_up`` the nodes of a level.
 
     Every node is summed by itself, from its bodies or from the two below it: the order of a sum
-    depends on nothing else. Second moments are kept over the mass, as lengths squared, and masses
-    in a unit near their own: products of both would leave single precision in SI units.
+    depends on nothing else. Moments are kept over the mass, as lengths squared: products of both
+    would leave single precision in SI units.
     """
     real, vec3, Tree = precision.scalar, precision.vec3, tree_type(precision)
     leaf, two = _of_leaf(precision), _of_two(precision)
-    numbers = np.finfo(precision.numpy)
-    least, most = real(4.0 * float(numbers.tiny)), real(float(numbers.max))
 
     @register
     def fill(
-        first: int, tree: Tree, mass_unit: wp.float64, own: int, by: wp.array(dtype=wp.int32),
+        first: int, tree: Tree, own: int, by: wp.array(dtype=wp.int32),
         position: wp.array(dtype=vec3), mass: wp.array(dtype=real),
         softening: wp.array(dtype=real),
     ):  # fmt: skip
@@ -123,7 +118,7 @@ def moment_kernels(precision: Precision) -> SimpleNamespace:
         tree.order[i] = body
         for k in range(3):
             tree.x[k, i] = position[body][k]
-        tree.x[3, i] = mass[body] / real(mass_unit)
+        tree.x[3, i] = mass[body]
         if own != 0:
             tree.x[4, i] = real(0.5) * softening[body] * softening[body]
 
@@ -135,20 +130,4 @@ def moment_kernels(precision: Precision) -> SimpleNamespace:
         else:
             two(node, tree)
 
-    @register
-    def measure(first: int, tree: Tree):
-        """One over the greatest power of two within the longest side of each world."""
-        w = first + wp.tid()
-        if tree.root[w] < 0:
-            return
-        box = tree.box[tree.root[w]]
-        size = wp.max(wp.max(box[3] - box[0], box[4] - box[1]), box[5] - box[2])
-        unit = real(1.0)
-        if size > least and size < most:
-            while unit > size:
-                unit = unit * real(0.5)
-            while unit <= real(0.5) * size:
-                unit = unit * real(2.0)
-        tree.scale[w] = real(1.0) / unit
-
-    return SimpleNamespace(fill=fill, sum_up=sum_up, measure=measure)
+    return SimpleNamespace(fill=fill, sum_up=sum_up)

@@ -41,7 +41,6 @@ def tree_type(precision: Precision) -> Any:
         "x": wp.array2d(dtype=precision.scalar),  # the planes by slot
         "cell": wp.array(dtype=precision.vector(CELL)),  # by node
         "box": wp.array(dtype=precision.vector(6)),  # by node: lower and upper corner
-        "scale": wp.array(dtype=precision.scalar),  # world -> one over its unit of length
     }
     return structure(f"Tree_{precision.name}", fields)
 

@@ -26,24 +26,24 @@ def _terms(precision: Precision, what: str) -> SimpleNamespace:
     real, vec3, Cell = precision.scalar, precision.vec3, precision.vector(CELL)
     forces = what == FORCE
 
-    def of_cell(q: Cell, d: vec3, s2: real, area: real):
+    def of_cell(q: Cell, d: vec3, s2: real):
         h = real(1.0) / wp.sqrt(wp.dot(d, d) + s2)
         h2 = h * h
-        s = area * vec3(
-            q[SECOND] * d[0] + q[SECOND + 3] * d[1] + q[SECOND + 4] * d[2],
-            q[SECOND + 3] * d[0] + q[SECOND + 1] * d[1] + q[SECOND + 5] * d[2],
-            q[SECOND + 4] * d[0] + q[SECOND + 5] * d[1] + q[SECOND + 2] * d[2],
+        e = h * d
+        s = h2 * vec3(
+            q[SECOND] * e[0] + q[SECOND + 3] * e[1] + q[SECOND + 4] * e[2],
+            q[SECOND + 3] * e[0] + q[SECOND + 1] * e[1] + q[SECOND + 5] * e[2],
+            q[SECOND + 4] * e[0] + q[SECOND + 5] * e[1] + q[SECOND + 2] * e[2],
         )
-        along = wp.dot(s, d) * h2
-        trace = area * (q[SECOND] + q[SECOND + 1] + q[SECOND + 2])
+        along = wp.dot(s, e)
+        trace = h2 * (q[SECOND] + q[SECOND + 1] + q[SECOND + 2])
         w = q[MASS] * h
-        v = w * h2
         if wp.static(forces):
-            turn = real(3.0) * v * h2
-            return (v + turn * (real(2.5) * along - real(0.5) * trace)) * d - turn * s
+            turn = real(3.0) * w * h
+            return (w * h + turn * (real(2.5) * along - real(0.5) * trace)) * e - turn * s
         return vec3(
-            w + v * (real(1.5) * along - real(0.5) * trace),
-            s2 * (v + v * h2 * (real(7.5) * along - real(1.5) * trace)),
+            w + w * (real(1.5) * along - real(0.5) * trace),
+            s2 * h2 * (w + w * (real(7.5) * along - real(1.5) * trace)),
             real(0.0),
         )
 
@@ -52,34 +52,30 @@ def _terms(precision: Precision, what: str) -> SimpleNamespace:
         h = real(1.0) / wp.sqrt(wp.max(r2 + s2, closest))
         w = m * h
         if wp.static(forces):
-            return wp.where(r2 > closest, w * h * h, real(0.0)) * d
+            return wp.where(r2 > closest, w * h, real(0.0)) * (h * d)
         w = wp.where(r2 + s2 > closest and not itself, w, real(0.0))
-        return vec3(w, w * h * h * s2, real(0.0))
+        return vec3(w, w * (s2 * h * h), real(0.0))
 
     return SimpleNamespace(of_cell=function(of_cell), of_body=function(of_body))
 
 
 def plain_walk(precision: Precision, what: str, own: bool) -> wp.Function:
-    """``walk(row, c, tree, p, unit, o)`` of the body in slot ``row``, which opens what its group c
-    opens; G m_i m_j is in ``unit``.
-    """
+    """``walk(row, c, tree, p, G, o)`` of the body in slot ``row``, which opens as its group c."""
     real, vec3 = precision.scalar, precision.vec3
     Tree, Gravity, Out = tree_type(precision), gravity_type(precision), out_type(precision, what)
     of_cell, of_body = vars(_terms(precision, what)).values()
     forces = what == FORCE
 
-    def walk_body(row: int, c: int, tree: Tree, p: Gravity, unit: wp.float64, o: Out):
+    def walk_body(row: int, c: int, tree: Tree, p: Gravity, G: wp.float64, o: Out):
         g = tree.group[c]
         w, box = tree.world[g], tree.box[g]
         low, high = vec3(box[0], box[1], box[2]), vec3(box[3], box[4], box[5])
         middle = low + real(0.5) * (high - low)
         half = wp.max(middle - low, high - middle)
-        scale = tree.scale[w]
-        area = scale * scale
-        x = scale * vec3(tree.x[0, row], tree.x[1, row], tree.x[2, row])
-        softening = p.softening_squared * area
+        x = vec3(tree.x[0, row], tree.x[1, row], tree.x[2, row])
+        softening = p.softening_squared
         if wp.static(own):
-            softening = tree.x[4, row] * area
+            softening = tree.x[4, row]
         total = vec3()
         node = tree.root[w]
         while node >= 0:
@@ -91,18 +87,17 @@ def plain_walk(precision: Precision, what: str, own: bool) -> wp.Function:
             to = node + 1
             if wp.dot(gap, gap) * p.opening_squared > q[RADIUS] + q[SOFTENING]:
                 to = tree.next[node]
-                total += of_cell(q, scale * center - x, softening + q[SOFTENING] * area, area)
+                total += of_cell(q, center - x, softening + q[SOFTENING])
             elif b - a <= LEAF:
                 to = tree.next[node]
                 for j in range(a, b):
-                    d = scale * vec3(tree.x[0, j], tree.x[1, j], tree.x[2, j]) - x
-                    s2 = softening + tree.x[4, j] * area
-                    total += of_body(tree.x[3, j], d, s2, j == row, p.closest_squared * area)
+                    d = vec3(tree.x[0, j], tree.x[1, j], tree.x[2, j]) - x
+                    s2 = softening + tree.x[4, j]
+                    total += of_body(tree.x[3, j], d, s2, j == row, p.closest_squared)
             node = to
         i = tree.order[row]
-        given = unit * wp.float64(tree.x[3, row] * scale)
+        given = G * wp.float64(tree.x[3, row])
         if wp.static(forces):
-            given = given * wp.float64(scale)
             for k in range(3):
                 o.f[i][k] = o.f[i][k] + real(given * wp.float64(total[k]))
         else:

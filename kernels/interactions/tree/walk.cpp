@@ -15,19 +15,13 @@ for (int n = 0; n < 3; ++n) {
     const real below = middle[n] - box[n], above = box[3 + n] - middle[n];
     half[n] = below > above ? below : above;
 }
-// In a unit near the size of the world, a power of two: no product leaves the precision, and no place
-// is rounded.
-const real scale = scales[world[g]], area = scale * scale;
-const real soft = p.softening_squared * area, closest = p.closest_squared * area;
-const real opening = p.opening_squared;
+const real soft = p.softening_squared, closest = p.closest_squared, opening = p.opening_squared;
 enum { X, Y, Z, M, XX, YY, ZZ, XY, XZ, YZ, S, ENTRIES, NUMBER = XX };
 alignas(64) real cell[ENTRIES][LIST], body[ENTRIES][LIST], sum[GROUP][SUMS][W] = {};
 alignas(64) real mine[4][GROUP] = {};
 for (int u = 0; u < own; ++u) {
-    mine[X][u] = px[a + u] * scale;
-    mine[Y][u] = py[a + u] * scale;
-    mine[Z][u] = pz[a + u] * scale;
-    mine[3][u] = OWN ? ps[a + u] * area : soft;
+    mine[X][u] = px[a + u], mine[Y][u] = py[a + u], mine[Z][u] = pz[a + u];
+    mine[3][u] = OWN ? ps[a + u] : soft;
 }
 auto at = [](const real* from) __attribute__((always_inline)) -> V { return *(const V*)from; };
 auto inverse_root = [](V v) __attribute__((always_inline)) -> V {
@@ -35,49 +29,52 @@ auto inverse_root = [](V v) __attribute__((always_inline)) -> V {
 };
 
 // What entries k to k + W - 1 of a list add to the sums of body u, whose place and softening are o.
+// Products are of such that are near 1, and of masses over squares of lengths: none leaves the
+// precision where its result does not.
 auto of_bodies = [&](V* s, const real* o, int u, int k) __attribute__((always_inline)) {
     const V dx = at(body[X] + k) - o[X], dy = at(body[Y] + k) - o[Y], dz = at(body[Z] + k) - o[Z];
     const V r2 = dx * dx + dy * dy + dz * dz;
     const V s2 = OWN ? at(body[S] + k) + o[3] : V{} + o[3];
-    const V h = inverse_root(r2 + s2), w = at(body[M] + k) * h;
     if (MEASURE) {
         const auto felt = (r2 + s2 > closest) & (at(body[NUMBER] + k) != (real)u);
-        s[0] += felt ? w : V{};
-        s[1] += felt ? w * h * h * s2 : V{};
+        const V h = felt ? inverse_root(r2 + s2) : V{}, w = at(body[M] + k) * h;
+        s[0] += w;
+        s[1] += w * (s2 * h * h);
     } else {
-        const V pull = r2 > closest ? w * h * h : V{};
-        s[0] += dx * pull;
-        s[1] += dy * pull;
-        s[2] += dz * pull;
+        const V h = r2 > closest ? inverse_root(r2 + s2) : V{}, pull = at(body[M] + k) * h * h;
+        s[0] += dx * h * pull;
+        s[1] += dy * h * pull;
+        s[2] += dz * h * pull;
     }
 };
 auto of_cells = [&](V* s, const real* o, int u, int k) __attribute__((always_inline)) {
     const V dx = at(cell[X] + k) - o[X], dy = at(cell[Y] + k) - o[Y], dz = at(cell[Z] + k) - o[Z];
     const V s2 = OWN ? at(cell[S] + k) + o[3] : V{} + o[3];
     const V h = inverse_root(dx * dx + dy * dy + dz * dz + s2), h2 = h * h;
+    const V ex = dx * h, ey = dy * h, ez = dz * h;
     const V xx = at(cell[XX] + k), yy = at(cell[YY] + k), zz = at(cell[ZZ] + k);
     const V xy = at(cell[XY] + k), xz = at(cell[XZ] + k), yz = at(cell[YZ] + k);
-    const V sx = xx * dx + xy * dy + xz * dz;
-    const V sy = xy * dx + yy * dy + yz * dz;
-    const V sz = xz * dx + yz * dy + zz * dz;
-    const V along = (sx * dx + sy * dy + sz * dz) * h2, trace = xx + yy + zz;
-    const V w = at(cell[M] + k) * h, v = w * h2;
+    const V sx = (xx * ex + xy * ey + xz * ez) * h2;
+    const V sy = (xy * ex + yy * ey + yz * ez) * h2;
+    const V sz = (xz * ex + yz * ey + zz * ez) * h2;
+    const V along = sx * ex + sy * ey + sz * ez, trace = (xx + yy + zz) * h2;
+    const V w = at(cell[M] + k) * h;
     if (MEASURE) {
-        s[0] += w + v * ((real)1.5 * along - (real)0.5 * trace);
-        s[1] += s2 * (v + v * h2 * ((real)7.5 * along - (real)1.5 * trace));
+        s[0] += w + w * ((real)1.5 * along - (real)0.5 * trace);
+        s[1] += s2 * h2 * (w + w * ((real)7.5 * along - (real)1.5 * trace));
     } else {
-        const V turn = (real)3 * v * h2;
+        const V v = w * h, turn = (real)3 * v;
         const V pull = v + turn * ((real)2.5 * along - (real)0.5 * trace);
-        s[0] += dx * pull - sx * turn;
-        s[1] += dy * pull - sy * turn;
-        s[2] += dz * pull - sz * turn;
+        s[0] += ex * pull - sx * turn;
+        s[1] += ey * pull - sy * turn;
+        s[2] += ez * pull - sz * turn;
     }
 };
 auto sum_up = [&](auto& list, int& many, auto add) __attribute__((always_inline)) {
     const int top = (many + W - 1) / W * W;
     for (int k = many; k < top; ++k) {  // without mass, and away from all
         for (int n = 0; n < ENTRIES; ++n) list[n][k] = 0;
-        list[X][k] = middle[X] * scale + 4;
+        list[X][k] = FAR;
         if (MEASURE) list[NUMBER][k] = 0;
     }
 #pragma clang loop unroll(disable)
@@ -107,20 +104,18 @@ for (int node = root[world[g]]; node >= 0;) {
         d2 += d > 0 ? d * d : 0;
     }
     if (d2 * opening > q[RADIUS] + q[SOFTENING]) {
-        for (int n = X; n <= Z; ++n) cell[n][cells] = q[n] * scale;
-        cell[M][cells] = q[M];
-        for (int n = XX; n <= YZ; ++n) cell[n][cells] = q[n] * area;
-        cell[S][cells] = q[SOFTENING] * area;
+        for (int n = X; n <= YZ; ++n) cell[n][cells] = q[n];
+        cell[S][cells] = q[SOFTENING];
         if (++cells == LIST) sum_up(cell, cells, of_cells);
         node = next[node];
     } else if (end[node] - begin[node] <= LEAF) {
         const int b = begin[node], n = end[node] - b;
         if (bodies + n > LIST) sum_up(body, bodies, of_bodies);
-        for (int k = 0; k < n; ++k) body[X][bodies + k] = px[b + k] * scale;
-        for (int k = 0; k < n; ++k) body[Y][bodies + k] = py[b + k] * scale;
-        for (int k = 0; k < n; ++k) body[Z][bodies + k] = pz[b + k] * scale;
+        for (int k = 0; k < n; ++k) body[X][bodies + k] = px[b + k];
+        for (int k = 0; k < n; ++k) body[Y][bodies + k] = py[b + k];
+        for (int k = 0; k < n; ++k) body[Z][bodies + k] = pz[b + k];
         for (int k = 0; k < n; ++k) body[M][bodies + k] = pm[b + k];
-        if (OWN) for (int k = 0; k < n; ++k) body[S][bodies + k] = ps[b + k] * area;
+        if (OWN) for (int k = 0; k < n; ++k) body[S][bodies + k] = ps[b + k];
         if (MEASURE) for (int k = 0; k < n; ++k) body[NUMBER][bodies + k] = (real)(b + k - a);
         bodies += n;
         node = next[node];
@@ -135,6 +130,6 @@ for (int u = 0; u < own; ++u) {
     for (int n = 0; n < SUMS; ++n)
         for (int l = 0; l < W; ++l) total[n] += sum[u][n][l];
     const long long particle = order[a + u];
-    const double given = unit * pm[a + u];
+    const double given = G * pm[a + u];
     STORE
 }

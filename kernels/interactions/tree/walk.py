@@ -16,7 +16,7 @@ import functools
 import warp as wp
 
 from ...engine.lanes import lane_count
-from ...engine.packed import FLAGS
+from ...engine.packed import FAR, FLAGS
 from ...native import body
 from ...precision import Precision, native, register
 from ...warp_internals import columns
@@ -35,11 +35,11 @@ from .nodes import (
 from .plain_walk import plain_walk
 
 LIST = 512  # entries of a list that are summed at a time
-# What is stored of the sums, by particle, with G m_i; masses and lengths have their own units.
+# What is stored of the sums, by particle, with G m_i.
 _STORED = {
-    FORCE: "for (int n = 0; n < 3; ++n) f[3 * particle + n] += (real)(given * area * total[n]);",
-    MEASURE: "energy[particle] -= 0.5 * given * scale * total[0]; "
-    "virial[particle] -= 0.5 * given * scale * (total[0] - total[1]);",
+    FORCE: "for (int n = 0; n < 3; ++n) f[3 * particle + n] += (real)(given * total[n]);",
+    MEASURE: "energy[particle] -= 0.5 * given * total[0]; "
+    "virial[particle] -= 0.5 * given * (total[0] - total[1]);",
 }
 
 
@@ -55,24 +55,22 @@ def walk_kernel(precision: Precision, what: str, own: bool, vectorised: bool) ->
     """
     Tree, Gravity, Out = tree_type(precision), gravity_type(precision), out_type(precision, what)
     walk = (_native if vectorised else plain_walk)(precision, what, own)
-    flags = FLAGS["any"] if vectorised else ""
+    flags = FLAGS["fused"] if vectorised else ""
 
     @functools.partial(register, cpu_only=vectorised, flags=flags)
-    def walk_tree(
-        first: int, tree: Tree, parameters: wp.array(dtype=Gravity), mass_unit: wp.float64, o: Out
-    ):
+    def walk_tree(first: int, tree: Tree, parameters: wp.array(dtype=Gravity), o: Out):
         row = first + wp.tid()
         c = row
         if wp.static(not vectorised):
             c = tree.group_of[row]
         p = parameters[tree.world[tree.group[c]]]
-        walk(row, c, tree, p, wp.float64(p.constant) * mass_unit * mass_unit, o)
+        walk(row, c, tree, p, wp.float64(p.constant), o)
 
     return walk_tree
 
 
 def _native(precision: Precision, what: str, own: bool) -> wp.Function:
-    """``walk(row, c, tree, p, unit, o)`` of all bodies of group c; G m_i m_j is in ``unit``."""
+    """``walk(row, c, tree, p, G, o)`` of all bodies of group c."""
     Tree, Gravity, Out = tree_type(precision), gravity_type(precision), out_type(precision, what)
     numbers = {
         "W": lane_count(precision), "GROUP": GROUP, "LIST": LIST, "CELL": CELL, "OWN": own,
@@ -80,15 +78,19 @@ def _native(precision: Precision, what: str, own: bool) -> wp.Function:
         "LEAF": LEAF, "RADIUS": RADIUS, "SOFTENING": SOFTENING,
     }  # fmt: skip
     arrays = {
-        "x": "tree.x", "cell_of": "tree.cell", "boxes": "tree.box", "scales": "tree.scale",
+        "x": "tree.x", "cell_of": "tree.cell", "boxes": "tree.box",
         **{f"int* {name}": f"tree.{name}" for name in
            ("begin", "end", "next", "world", "root", "group", "order")},
         **({"f": "o.f"} if what == FORCE else
            {"double* energy": "o.energy", "double* virial": "o.virial"}),
     }  # fmt: skip
-    macros = {"stride": f"((long long){columns('tree.x')})", "STORE": _STORED[what]}
+    macros = {
+        "stride": f"((long long){columns('tree.x')})",
+        "STORE": _STORED[what],
+        "FAR": FAR[precision.c],
+    }
     snippet = body("interactions/tree/walk.cpp", precision, numbers, arrays, macros)
 
-    def walk_group(row: int, c: int, tree: Tree, p: Gravity, unit: wp.float64, o: Out): ...
+    def walk_group(row: int, c: int, tree: Tree, p: Gravity, G: wp.float64, o: Out): ...
 
     return native(walk_group, snippet, after_gradients=False)

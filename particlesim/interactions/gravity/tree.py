@@ -84,7 +84,6 @@ class Tree:
         data.x = wp.zeros(shape, dtype=precision.scalar, device=device)
         data.cell = wp.zeros(len(begin), dtype=precision.vector(nodes.CELL), device=device)
         data.box = wp.zeros(len(begin), dtype=precision.vector(6), device=device)
-        data.scale = wp.zeros(model.world_count, dtype=precision.scalar, device=device)
         self.group_count, self.worlds = len(group), world
         counts = np.bincount(level)
         return list(zip(np.cumsum(counts) - counts, counts, strict=True)), data
@@ -97,11 +96,10 @@ class Tree:
         device, made = self.model.device, self.kernels
         softening = state["softening"] if self.own else state.mass
         of_bodies = [self.order.by, state.position, state.mass, softening]
-        inputs = [self.data, self.model.mass_unit, int(self.own), *of_bodies]
+        inputs = [self.data, int(self.own), *of_bodies]
         launch(made.fill, self.count, inputs, device)
         for start, count in reversed(self.levels):
             launch(made.sum_up, count, [start, self.data], device)
-        launch(made.measure, self.model.world_count, [self.data], device)
 
     def pull(self, state: State) -> None:
         """Add the forces."""
@@ -117,7 +115,7 @@ class Tree:
         model = self.model
         kernel = walk_kernel(model.precision, what, self.own, model.vectorised)
         o = filled(nodes.out_type(model.precision, what), out)
-        inputs = [self.data, self.params, model.mass_unit, o]
+        inputs = [self.data, self.params, o]
         if model.vectorised:
             launch(kernel, self.group_count * nodes.GROUP, inputs, model.device, nodes.GROUP)
         else:
@@ -131,7 +129,7 @@ class Tree:
         cell = self.data.cell.numpy()[self.worlds == world].astype(np.float64)
         s2 = self.params.numpy()["softening_squared"][world] + 2.0 * cell[:, nodes.SOFTENING]
         R2 = 5.0 / 3.0 * cell[:, nodes.SECOND : nodes.SECOND + 3].sum(axis=1)
-        return cell[:, nodes.MASS] * self.model.mass_unit, R2 + s2
+        return cell[:, nodes.MASS], R2 + s2
 
     def couples(self, world: int) -> tuple[np.ndarray, np.ndarray]:
         """Of every two bodies in a leaf their mass, and the square of their softened distance;
@@ -146,7 +144,7 @@ class Tree:
         a, b = x[:, first[there]], x[:, second[there]]
         r2 = ((a[:3] - b[:3]) ** 2).sum(axis=0)
         s2 = a[4] + b[4] + self.params.numpy()["softening_squared"][world]
-        return (a[3] + b[3]) * self.model.mass_unit, np.where(r2 > 0, r2 + s2, np.inf)
+        return a[3] + b[3], np.where(r2 > 0, r2 + s2, np.inf)
 
 
 def _halves(model: Model, members: np.ndarray) -> tuple[np.ndarray, ...]:
