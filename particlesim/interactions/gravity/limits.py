@@ -92,10 +92,11 @@ def orbits(part: Any, probe: Probe) -> list[Limit]:
     (r^2 + s^2)^(3/2). The answer of the force to small changes, by which the sum over all pairs is
     judged, is not that of a tree: it jumps by the tree's error where a cell is opened.
     """
+    part.tree.build(probe.state)
     found = []
     for w, peer in enumerate(part.peers):
         G = abs(peer.parameters["constant"])
-        rates = [part.tree.nodes(probe.state, w), part.tree.couples(w)]
+        rates = [part.tree.nodes(w), part.tree.couples(w)]
         with np.errstate(all="ignore"):
             omega2 = np.concatenate([G * mass / square**1.5 for mass, square in rates])
         omega2 = omega2[np.isfinite(omega2)]

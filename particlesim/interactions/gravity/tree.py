@@ -121,19 +121,18 @@ class Tree:
         else:
             launch(kernel, self.count, inputs, model.device)
 
-    def nodes(self, state: State, world: int) -> tuple[np.ndarray, np.ndarray]:
-        """Of each node of a world its mass, and the squares of its softening and of the radius of a
-        homogeneous ball that has its second moments, R^2 = 5/3 <y^2>, summed.
+    def nodes(self, world: int) -> tuple[np.ndarray, np.ndarray]:
+        """Of each node of a world, as last built, its mass, and the squares of its softening and of
+        the radius of a homogeneous ball that has its second moments, R^2 = 5/3 <y^2>, summed.
         """
-        self.build(state)
         cell = self.data.cell.numpy()[self.worlds == world].astype(np.float64)
         s2 = self.params.numpy()["softening_squared"][world] + 2.0 * cell[:, nodes.SOFTENING]
         R2 = 5.0 / 3.0 * cell[:, nodes.SECOND : nodes.SECOND + 3].sum(axis=1)
         return cell[:, nodes.MASS], R2 + s2
 
     def couples(self, world: int) -> tuple[np.ndarray, np.ndarray]:
-        """Of every two bodies in a leaf their mass, and the square of their softened distance;
-        as last built.
+        """Of every two bodies in a leaf, as last built, their mass, and the square of their
+        distance, softened.
         """
         begin, end = self.data.begin.numpy(), self.data.end.numpy()
         leaf = np.nonzero((self.worlds == world) & (end - begin <= nodes.LEAF))[0]
