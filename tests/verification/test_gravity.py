@@ -95,6 +95,28 @@ def test_a_uniform_sphere_holds_three_fifths(device):
     assert found.virial[0] == pytest.approx(found.potential[0], rel=1e-12)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("angle", "error"), [(0.5, 1e-3), (0.2, 3e-5)])
+def test_a_tree_on_a_plummer_sphere(angle, error, device):
+    # Root mean square of the relative error of single forces, on a sample: what is promised.
+    n = 100_000
+    x = ps.sample.plummer((0, 0, 0), 1.0, n).astype(np.float32).astype(float)
+    x = x[np.random.default_rng(0).permutation(n)]
+    scene = ps.Scene()
+    scene.add_particles(x, mass=1 / n)
+    scene.add_interaction(ps.Gravity(G=1.0))
+    sim = ps.Simulation(scene, ps.Settings(opening_angle=angle), device=device)
+    sim.forces(1.0)
+    f, off = sim.get("force"), []
+    for k in range(1000):
+        d = x - x[k]
+        r2 = (d**2).sum(axis=1)
+        r2[k] = np.inf
+        true = (d / r2[:, None] ** 1.5).sum(axis=0) / n**2
+        off.append(np.linalg.norm(f[k] - true) / np.linalg.norm(true))
+    assert np.sqrt(np.mean(np.square(off))) < error
+
+
 @pytest.mark.parametrize("angle", [None, 0.5])
 def test_plummer_sphere(angle, device):
     # U = -3 pi / 32 G M^2 / a. Of n points the sum lacks each one's own cell, n^(-2/3) of it, and

@@ -2,8 +2,8 @@
 
 A cell far from the box around the group, r > b / theta with b its radius and theta the opening
 angle, acts by its mass and its second moments s = sum m_j y_j y_j / M about its centre of mass, at
-d from a body and with u^2 = d^2 + S^2 (Hernquist 1987, eq. 2.4, here with softening, whose s has a
-trace that counts):
+d from a body and with u^2 = d^2 + S^2 (Hernquist 1987; where there is softening, the trace of s
+counts):
 
     phi = -M [1/u + 3/2 d.s.d / u^5 - 1/2 tr s / u^3],  a = grad_d phi.
 
