@@ -39,7 +39,7 @@ from .interactions.fluid.equations_of_state import EquationOfState, Polytrope, T
 from .interactions.fluid.sph import SPH
 from .interactions.fluid.viscosities import ArtificialViscosity, Viscosity
 from .interactions.grains import HertzianGrains
-from .interactions.gravity import Gravity
+from .interactions.gravity.gravity import Gravity
 from .interactions.pair_laws import PairForce, PairPotential
 from .interactions.pair_sum import PairSum
 from .interactions.particle import ConstantForce, Drag, ParticleForce, UniformGravity

@@ -15,6 +15,8 @@ NAMES = list(ready_scenes())
 SMALL = {
     "dam_break": {"spacing": 0.05},
     "star_collision": {"count": 150},
+    "plummer_sphere": {"count": 300},
+    "galaxy_collision": {"count": 300, "softening": 0.2},
     "freezing": {"cells": 5},
     "lj_melt": {"cells": 4},
     "phase_transition": {"cells": 4},
@@ -33,8 +35,9 @@ def simulate(name, frames, device, settings=None, **options):
 
 def test_the_ready_scenes_are_all_there():
     expected = (
-        "bouncing_block chain dam_break freezing gas_in_a_box lj_melt phase_transition pile "
-        "polymer_melt spring_lattice star_collision three_body triple_pendulum wave_field"
+        "bouncing_block chain dam_break freezing galaxy_collision gas_in_a_box lj_melt "
+        "phase_transition pile plummer_sphere polymer_melt spring_lattice star_collision "
+        "three_body triple_pendulum wave_field"
     )
     assert set(expected.split()) <= set(NAMES)
 
@@ -130,6 +133,32 @@ def test_a_crystal_melts_and_freezes(device):
     frozen = down & (bath < 0.4) & (bath > 0.35)
     line = energy[warm].mean() - 3.0 * (0.875 - 0.375)
     assert energy[frozen].mean() < line - 0.2
+
+
+def test_a_cluster_in_equilibrium_stays_as_it_is(device):
+    module, sim = simulate("plummer_sphere", 0, device, count=10_000)
+    before = sim.diagnostics()
+    sim.run(100)
+    after = sim.diagnostics()
+    # The number within a radius scatters by sqrt(n) / 2, half a percent, and the radius of half the
+    # mass by that over d ln m / d ln r = 3 / 2 / (1 + r^2) = 0.55: one percent.
+    assert module.error(sim) < 0.03
+    # Of n stars kinetic energy is known to sqrt(2 / (3 n)).
+    assert 2 * after.kinetic[0] / -after.potential[0] == pytest.approx(1, abs=0.025)
+    # Leapfrog keeps the energy, (omega dt)^2 / 12 of a part with omega = 1 at the centre.
+    assert after.energy[0] == pytest.approx(before.energy[0], rel=2e-4)
+
+
+@pytest.mark.slow
+def test_galaxies_keep_their_energy(device):
+    _, sim = simulate("galaxy_collision", 0, device, count=5000)
+    before = sim.diagnostics()
+    assert 2 * before.kinetic[0] / -before.potential[0] == pytest.approx(1, abs=0.05)
+    sim.run(150)
+    after = sim.diagnostics()
+    assert after.energy[0] == pytest.approx(before.energy[0], rel=5e-3)
+    # Forces sum to zero within a tree's error, 1e-3, of a mean force of some 0.1, in any direction.
+    assert np.abs(after.momentum).max() < 1e-3 * 0.1 * sim.time
 
 
 @pytest.mark.slow

@@ -79,10 +79,11 @@ def _fused(parts: Sequence[Pair]) -> tuple[PairLoop, Term]:
 
 def fuse(interactions: Sequence[Interaction]) -> list[Interaction]:
     """The passes that evaluate these interactions: pair forces with one list become one pass."""
-    passes_of = _passes([each for each in interactions if isinstance(each, Pair)])
+    listed = [each for each in interactions if isinstance(each, Pair) and each.listed]
+    passes_of, of_lists = _passes(listed), {id(each) for each in listed}
     passes: list[Interaction] = []
     for each in interactions:
-        passes += passes_of.get(id(each), []) if isinstance(each, Pair) else [each]
+        passes += passes_of.get(id(each), []) if id(each) in of_lists else [each]
     return passes
 
 

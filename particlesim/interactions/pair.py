@@ -58,6 +58,8 @@ class Pair(Interaction):
         switch: In parts of the cutoff.
     """
 
+    listed = True  # sums over a list of pairs, in one pass with others that share it
+
     def __init__(
         self,
         potential: Law | None,

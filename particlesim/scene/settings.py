@@ -38,6 +38,9 @@ class Settings:
             moved half of it. Changes the cost, not the forces. None: as thick as pays in each
             world, by how long its lists have lasted; on CUDA 0.12 of the cutoff, 0.4 of that of
             contacts.
+        opening_angle: Gravity is summed by a tree, whose cells act as a whole where they are seen
+            under at most this angle, their radius over their distance; from 0 (none do) to 1. 0.5
+            is a good choice (see :class:`particlesim.Gravity`). None: over all pairs.
         compensated: Carry the rounding error of positions and velocities along (Kahan 1965), so
             that neither freezes where an increment is below the last bit.
         relaxation: Factor on averaged (Jacobi) contact corrections, above 0, at most 1: more would
@@ -86,6 +89,7 @@ class Settings:
     energy_growth: float = 100.0
     ledger: bool = False
     safety: float | None = None
+    opening_angle: float | None = None
 
     def __new__(cls, *args: Any, **knobs: Any) -> Settings:
         validate.known("Settings", knobs, [f.name for f in dataclasses.fields(cls)], "knob")
@@ -126,6 +130,10 @@ class Settings:
             )
         if self.threads is not None:
             checked["threads"] = validate.whole(owner, "threads", self.threads, minimum=1)
+        if self.opening_angle is not None:
+            checked["opening_angle"] = validate.number(
+                owner, "opening_angle", self.opening_angle, minimum=0.0, maximum=1.0
+            )
         for name in ("compensated", "watchdog", "ledger"):
             value = getattr(self, name)
             if not isinstance(value, bool):

@@ -24,6 +24,7 @@ SMALL = {
     "grains": {"side": 3},
     "grains_200k": {"side": 3},
     "gravity": {"count": 20, "steps": 1},
+    "gravity_tree": {"count": 20, "steps": 1},
     "lennard_jones": {"count": 500, "frames": 1},
     "lennard_jones_256k": {"count": 500, "frames": 1},
     "memory": {"count": 500, "side": 5},
@@ -36,6 +37,7 @@ SMALL = {
 WITH_PEERS = {
     "cloth": {"side": 11},
     "gravity": {"count": 500, "steps": 5},
+    "gravity_tree": {"count": 500, "steps": 5},
     "grains": {"side": 8},
     "lennard_jones": {"count": 2048, "frames": 10},
     "memory": {"count": 2048, "side": 5},

@@ -90,6 +90,18 @@ QUANTITIES = {
     "middle": Quantity((0.1, 0.2, -0.1), (1, 0, 0), "point"),
     "size": Quantity(1.9, (1, 0, 0)),
     "length": Quantity(2.5, (1, 0, 0)),
+    "constant": Quantity(0.6, (3, 1, -2)),
+    "modulus": Quantity(40.0, (-1, 1, -2)),
+    "ratio": Quantity(0.3),
+    "dissipation": Quantity(0.02, (0, 0, 1)),
+    "sliding": Quantity(0.05, (0, 0, 1)),
+    "depth": Quantity(0.8, (2, 1, -2)),
+    "steepness": Quantity(1.7, (-1, 0, 0)),
+    "distance": Quantity(1.1, (1, 0, 0)),
+    "exponent": Quantity(2.5),
+    "screening": Quantity(0.9, (1, 0, 0)),
+    ("Coulomb", "damping"): Quantity(0.3, (-1, 0, 0)),
+    ("SoftSphere", "sigma"): Quantity(1.6, (1, 0, 0)),
     "rest_angle": Quantity(1.9),
     ("HarmonicAngles", "stiffness"): Quantity(3.0, (2, 1, -2)),
     ("SphereBoundary", "radius"): Quantity(1.9, (1, 0, 0)),
@@ -108,7 +120,10 @@ LAWS = {
 }
 PLAIN = {**TUPLES, "group": None, "exponents": (12, 6)}
 LEFT_OUT = {"break_force", "inequality", "tension_only", "truncation", "inside", "potential",
-            "smoothing", "dimension", "viscosity", "pivot", "drawn"}  # fmt: skip
+            "smoothing", "dimension", "viscosity", "pivot", "drawn", "mixing", "groups", "exclude",
+            "switch", "method", "tolerance", ("Electrostatics", "cutoff"),
+            ("Electrostatics", "damping")}  # fmt: skip
+BOUND = ("FieldForce",)  # to a grid, which rests in the frame that it is made in
 
 
 def fluid_parts(frame):
@@ -128,7 +143,7 @@ def kinds():
         kind = getattr(ps, name)
         if isinstance(kind, type) and issubclass(kind, Interaction | ConstraintBase):
             abstract = kind in (Interaction, ConstraintBase)
-            if not abstract:
+            if not abstract and name not in BOUND:
                 found[name] = kind
     return found
 
@@ -146,7 +161,7 @@ def arguments(name, frame):
             given[key] = PLAIN[key]
         elif key in fluid_parts(frame):
             given[key] = fluid_parts(frame)[key]
-        elif key not in LEFT_OUT and parameter.kind is not parameter.VAR_KEYWORD:
+        elif not {key, (name, key)} & LEFT_OUT and parameter.kind is not parameter.VAR_KEYWORD:
             given[key] = frame.of(quantity(name, key))
     if "lower" in given:  # corners are turned, and the box is then named by its new ones
         corners = given["lower"], given["upper"]
@@ -199,6 +214,7 @@ def scene(names, frame=None, order=None, changed=None, box=None, places=None):
     result.add_particles(
         frame.point(x)[order], velocity=frame.velocity(v)[order],
         mass=m[order] * frame.mass, radius=radius[order] * frame.length,
+        charge=np.resize([1.0, -1.0, 0.5], COUNT)[order],
     )  # fmt: skip
     for name in names:
         part = make(name, frame) if changed is None else changed(name, frame)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 import particlesim as ps
 
@@ -228,12 +229,17 @@ def test_a_box_narrower_than_two_cutoffs_is_refused():
         ps.Simulation(scene, device="cpu")
 
 
+@ps.law
+def fading(r: float):
+    return wp.exp(-r) / r
+
+
 @pytest.mark.parametrize("count", [0, 1])
 def test_hardly_any_particles(count, device):
     scene = ps.Scene(periodic=((0, 0, 0), (10, 10, 10)))
     scene.add_particles(np.ones((count, 3)), velocity=(1, 0, 0))
     scene.add_interaction(ps.LennardJones())
-    scene.add_interaction(ps.Gravity())
+    scene.add_interaction(ps.PairForce(fading, cutoff=None))
     sim = ps.Simulation(scene, ps.Settings(dt=0.1), device=device)
     sim.step()
     assert sim.position.shape == (count, 3)

@@ -69,7 +69,7 @@ PARTS = {
              "equation_of_state": ps.Polytrope(1.0, 1.0)},
     ps.Scene: {"meters_per_unit": 1.0, "periodic": ((0, 0, 0), (1, 1, 1))},
     ps.Settings: {"dt": 0.1, "skin": 0.1, "relaxation": 0.5, "depenetration_speed": 1.0,
-                  "substeps": 2, "iterations": 2, "threads": 1},
+                  "opening_angle": 0.5, "substeps": 2, "iterations": 2, "threads": 1},
     ps.SoftSphere: {"epsilon": 1.0, "sigma": 1.0, "exponent": 2.0},
     ps.Springs: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0, "damping": 0.1},
     ps.Tait: {"sound_speed": 10.0, "exponent": 7.0},

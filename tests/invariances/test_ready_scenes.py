@@ -14,6 +14,8 @@ from particlesim.commands.scene_files import ready_scenes
 SMALL = {
     "dam_break": {"spacing": 0.06},
     "star_collision": {"count": 120},
+    "plummer_sphere": {"count": 240},
+    "galaxy_collision": {"count": 240, "softening": 0.2},
     "freezing": {"cells": 5},
     "lj_melt": {"cells": 4},
     "phase_transition": {"cells": 4},

@@ -151,6 +151,12 @@ def constrained(periodic, *, breaks, bounces):
     return scene
 
 
+def attracted(s, **attributes):
+    scene = particles(**attributes)
+    scene.add_interaction(ps.Gravity(softening=s))
+    return scene
+
+
 BOX = ((0, 0, 0), (10, 10, 10))
 VERLET = {"integrator": "velocity_verlet"}
 SCENES = {
@@ -167,12 +173,14 @@ SCENES = {
     ),
     "constraints": (lambda: constrained(None, breaks=False, bounces=True), {"ledger": True}),
     "breaking": (lambda: constrained(BOX, breaks=True, bounces=False), {"compensated": False}),
+    "tree": (lambda: attracted(0.1), {"opening_angle": 0.5}),
+    "own_softening": (lambda: attracted(None, softening=0.1), {"opening_angle": 0.5}),
     **{name: (lambda name=name: load_scene(name).build(), {}) for name in ready_scenes()},
 }  # fmt: skip
 
 EVERY_KERNEL = (
     "forces", "charged", "damped", "periodic_forces", "fluid", "constraints", "breaking",
-    "star_collision",
+    "star_collision", "tree",
 )  # fmt: skip
 
 

@@ -90,7 +90,7 @@ CASES = {
         lambda r, c: -c["mass_j"] * c["radius_i"] / r**2,
     ),
 }
-PERIODIC = {"lennard_jones", "gravity", "derived"}
+PERIODIC = {"lennard_jones", "derived_all_pairs", "derived"}
 
 
 def scene_of(make, periodic):

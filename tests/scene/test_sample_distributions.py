@@ -83,6 +83,21 @@ def test_stretch_works_where_the_core_is_empty():
 # Velocities
 
 
+def test_plummer_sphere_is_in_equilibrium():
+    n = 20_000
+    x = sample.plummer((1, 2, 3), 2.0, n)
+    v = sample.plummer_velocity(x, (1, 2, 3), 2.0, mass=3.0, G=5.0)
+    r = np.linalg.norm(x - (1, 2, 3), axis=1)
+    # Half the mass is within 1.304766 a (to 1 / n), and 2 K = 3 pi / 32 G M^2 / a: squares of
+    # speeds scatter by about their mean over the cluster, 1 / sqrt(n).
+    assert np.median(r) == pytest.approx(2 * 1.304766, rel=2 / n)
+    assert (v**2).sum(axis=1).mean() == pytest.approx(3 * np.pi / 32 * 15 / 2, rel=4 / np.sqrt(n))
+    # As fast along the radius as across it, and never as fast as would leave.
+    along = ((x - (1, 2, 3)) * v).sum(axis=1) / r
+    assert (along**2).mean() / (v**2).sum(axis=1).mean() == pytest.approx(1 / 3, abs=4 / np.sqrt(n))
+    assert ((v**2).sum(axis=1) < 2 * 15 / np.sqrt(r**2 + 4)).all()
+
+
 def test_maxwell_boltzmann_temperature_and_drift():
     n, temperature, boltzmann = 20_000, 2.5, 1.3
     mass = np.linspace(0.5, 4.0, n)

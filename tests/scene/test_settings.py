@@ -48,6 +48,7 @@ def test_an_unknown_knob_lists_the_known_ones(make, refused):
         ("precision", ["float16", 64]),
         ("execution", ["gpu"]),
         ("skin", [-0.1, float("nan")]),
+        ("opening_angle", [-0.1, 1.1, float("nan"), "wide"]),
         ("relaxation", [0.0, 2.5, float("nan")]),
         ("depenetration_speed", [0.0, -1.0, float("inf")]),
         ("threads", [0, 1.5]),

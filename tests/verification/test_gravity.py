@@ -95,15 +95,54 @@ def test_a_uniform_sphere_holds_three_fifths(device):
     assert found.virial[0] == pytest.approx(found.potential[0], rel=1e-12)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("angle", "error"), [(0.5, 1e-3), (0.2, 3e-5)])
+def test_a_tree_on_a_plummer_sphere(angle, error, device):
+    # Root mean square of the relative error of single forces, on a sample: what is promised.
+    n = 100_000
+    x = ps.sample.plummer((0, 0, 0), 1.0, n).astype(np.float32).astype(float)
+    x = x[np.random.default_rng(0).permutation(n)]
+    scene = ps.Scene()
+    scene.add_particles(x, mass=1 / n)
+    scene.add_interaction(ps.Gravity(G=1.0))
+    sim = ps.Simulation(scene, ps.Settings(opening_angle=angle), device=device)
+    sim.forces(1.0)
+    f, off = sim.get("force"), []
+    for k in range(1000):
+        d = x - x[k]
+        r2 = (d**2).sum(axis=1)
+        r2[k] = np.inf
+        true = (d / r2[:, None] ** 1.5).sum(axis=0) / n**2
+        off.append(np.linalg.norm(f[k] - true) / np.linalg.norm(true))
+    assert np.sqrt(np.mean(np.square(off))) < error
+
+
+@pytest.mark.parametrize("angle", [None, 0.5])
+def test_plummer_sphere(angle, device):
+    # U = -3 pi / 32 G M^2 / a. Of n points the sum lacks each one's own cell, n^(-2/3) of it, and
+    # scatters by 1 / sqrt(n) as directions are random.
+    n = 4000
+    scene = ps.Scene()
+    scene.add_particles(ps.sample.plummer((0, 0, 0), 1.0, n), mass=1 / n)
+    scene.add_interaction(ps.Gravity(G=1.0))
+    settings = ps.Settings(precision="float64", opening_angle=angle)
+    found = ps.Simulation(scene, settings, device=device).diagnostics()
+    within = n ** (-2 / 3) + 1 / np.sqrt(n)
+    assert found.potential[0] == pytest.approx(-3 * np.pi / 32, rel=within)
+    assert found.virial[0] == pytest.approx(found.potential[0], rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("mass", "distance"), [(5.972e24, 1.496e11), (700.0, 2.4e13), (1e21, 1.3e14)]
 )
-def test_the_sun_in_single_precision(mass, distance, device):
+@pytest.mark.parametrize("angle", [None, 0.5])
+def test_the_sun_in_single_precision(mass, distance, angle, device):
     """Products of masses and powers of distances leave its range; force and energy do not."""
     scene = ps.Scene()
     scene.add_particles([(0, 0, 0), (distance, 0, 0)], mass=[1.989e30, mass])
     scene.add_interaction(ps.Gravity(G=6.6743e-11))
-    sim = ps.Simulation(scene, ps.Settings(precision="float32"), device=device)
+    settings = ps.Settings(precision="float32", opening_angle=angle)
+    sim = ps.Simulation(scene, settings, device=device)
     energy = 6.6743e-11 * 1.989e30 * mass / distance
     few = 10 * float(np.finfo(np.float32).eps)
     np.testing.assert_allclose(sim.get("force")[:, 0], np.array([1, -1]) * energy / distance, few)

@@ -62,6 +62,7 @@ def _knobs(settings: Settings) -> list[Case]:
         "precision": ("float32", "float64"),
         "compensated": (False, True),
         "skin": (0.0, 1e-3, 1.0),
+        "opening_angle": (0.0, 1.0),
         "relaxation": (0.05, 1.0),
         "depenetration_speed": (1e-6, 1e6),
         "execution": ("graph", "threads"),

@@ -14,6 +14,7 @@ range, negative counts) are a ``ValueError``; a function's docstring names only 
 
 from .arrange import links, rotate
 from .distributions import maxwell_boltzmann, random, stretch, uniform_sphere
+from .plummer import plummer, plummer_velocity
 from .shapes import box, cylinder, lattice, sphere
 
 __all__ = [
@@ -22,6 +23,8 @@ __all__ = [
     "lattice",
     "links",
     "maxwell_boltzmann",
+    "plummer",
+    "plummer_velocity",
     "random",
     "rotate",
     "sphere",

@@ -197,6 +197,8 @@ def of_laws():
     yield Row("particles that are added to a scene in motion", partial(scene, TWO), never, 3,
         act=add, names="scene must be complete")
     yield Row("a negative skin", partial(scene, TWO), never, knobs={"skin": -1.0}, names="skin")
+    yield Row("an opening angle that sees bodies in their own cell", partial(scene, TWO,
+        ps.Gravity()), never, knobs={"opening_angle": 2.0}, names="opening_angle")
     fast = ps.sample.lattice("sc", (4, 4, 4), 1.12)
     yield Row("atoms that pass many cells in a substep", partial(scene, fast,
         ps.LennardJones(cutoff=2.5), velocity=50 * np.sin(7 * fast[:, ::-1])), energy_kept(), 10,

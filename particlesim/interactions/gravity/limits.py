@@ -1,17 +1,13 @@
-"""Gravity between all pairs of particles."""
+"""What limits the step of gravity: tides, orbits and passages."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-import warp as wp
 
-from .. import validate
-from ..engine.limit import Limit
-from ..engine.probe import Probe
-from ..scene.law import law
-from .pair import Pair
+from ...engine.limit import Limit
+from ...engine.probe import Probe
 
 MOST = 4096  # bodies of a world whose pairs are all looked at
 HEAD_ON = 1e-6  # of their distance: a pericentre that counts as none
@@ -28,18 +24,18 @@ def closest_approach(part: Any, probe: Probe) -> list[Limit]:
     """
     found = []
     for w, peer in enumerate(part.peers):
-        rows = part.pairs.members_host[probe.model.world_of[part.pairs.members_host] == w]
+        rows = part.members[probe.model.world_of[part.members] == w]
         if 2 <= len(rows) <= MOST:
             found += _of_world(part, peer, probe, w, rows)
     return [min(found, key=lambda limit: limit.dt)] if found else []
 
 
 def _of_world(part: Any, peer: Any, probe: Probe, w: int, rows: np.ndarray) -> list[Limit]:
-    G, s = peer.parameters["constant"], peer.parameters["softening"]
+    G, s = peer.parameters["constant"], softenings(part, peer, probe, rows)
     m, x, v = probe.mass[rows], probe.position[rows], probe.velocity[rows]
     free = probe.inverse_mass[rows] > 0
     x_ij = x[None] - x[:, None]
-    r2 = (x_ij**2).sum(axis=2) + s**2
+    r2 = (x_ij**2).sum(axis=2) + 0.5 * (s[None] ** 2 + s[:, None] ** 2)
     np.fill_diagonal(r2, np.inf)
     with np.errstate(divide="ignore", invalid="ignore"):
         pull = G * m[None, :] / r2
@@ -56,7 +52,7 @@ def _of_world(part: Any, peer: Any, probe: Probe, w: int, rows: np.ndarray) -> l
         energy = 0.5 * (u**2).sum(axis=1) - mu / r
         p = (np.cross(d, u) ** 2).sum(axis=1) / mu
         e = np.sqrt(np.maximum(0.0, 1.0 + 2.0 * energy * p / mu))
-        closest = np.minimum(p / (1.0 + e), r)
+        closest, s = np.minimum(p / (1.0 + e), r), np.sqrt(0.5 * (s[i] ** 2 + s[j] ** 2))
         omega = np.sqrt(mu) / (closest**2 + s**2) ** 0.75
         alone = np.linalg.norm(tide, axis=1) < np.linalg.norm(own, axis=1)
         coming = ((d * u).sum(axis=1) < 0) | (energy < 0)
@@ -75,11 +71,12 @@ def _of_world(part: Any, peer: Any, probe: Probe, w: int, rows: np.ndarray) -> l
 
 
 def closest_passage(part: Any, probe: Probe) -> list[Limit]:
-    """The heaviest two at the softening length's depth: omega^2 = G (m_i + m_j) / s^3."""
+    """The heaviest two at the least softening length's depth: omega^2 = G (m_i + m_j) / s^3."""
     found = []
     for w, peer in enumerate(part.peers):
-        members = part.pairs.members_host[probe.model.world_of[part.pairs.members_host] == w]
-        s, G = peer.parameters["softening"], abs(peer.parameters["constant"])
+        members = part.members[probe.model.world_of[part.members] == w]
+        s = softenings(part, peer, probe, members).min(initial=np.inf)
+        G = abs(peer.parameters["constant"])
         mass = np.sort(probe.mass[members])[-2:]
         if s > 0 and G > 0 and len(mass) == 2:
             omega = float(np.sqrt(G * mass.sum() / s**3))
@@ -88,44 +85,30 @@ def closest_passage(part: Any, probe: Probe) -> list[Limit]:
     return [min(found, key=lambda limit: limit.dt)] if found else []
 
 
-@law
-def gravity_potential(r: float, mass_i: float, mass_j: float, constant: float, softening: float):
-    return -(constant * mass_i) * (mass_j / wp.sqrt(r * r + softening * softening))
+def orbits(part: Any, probe: Probe) -> list[Limit]:
+    """The fastest orbit within a node of the tree, or of two bodies in a leaf.
 
-
-@law
-def gravity_force(r: float, mass_i: float, mass_j: float, constant: float, softening: float):
-    # In an order that stays in single precision's range wherever the force does.
-    d2 = r * r + softening * softening
-    return -(constant * mass_i) * (mass_j / d2) * (r / wp.sqrt(d2))
-
-
-class Gravity(Pair):
-    """Newton's gravity between all pairs of a world, u = -G m_i m_j / sqrt(r^2 + s^2).
-
-    Softened after Plummer (1911). Costs the square of the number of particles. In a periodic box it
-    acts between nearest images only, which jump at half the box: a run warns of it.
-
-    Args:
-        group: Which particles attract each other; None: all.
-        G: [length^3 / (mass time^2)].
-        softening: s [length], at least 0.
-
-    Example:
-        >>> Gravity(G=1.0, softening=0.01).cutoff is None
-        True
+    omega^2 = G M / (R^2 + s^2)^(3/2) with a node's mass and size, or G (m_i + m_j) /
+    (r^2 + s^2)^(3/2). The answer of the force to small changes, by which the sum over all pairs is
+    judged, is not that of a tree: it jumps by the tree's error where a cell is opened.
     """
+    part.tree.build(probe.state)
+    found = []
+    for w, peer in enumerate(part.peers):
+        G = abs(peer.parameters["constant"])
+        rates = [part.tree.nodes(w), part.tree.couples(w)]
+        with np.errstate(all="ignore"):
+            omega2 = np.concatenate([G * mass / square**1.5 for mass, square in rates])
+        omega2 = omega2[np.isfinite(omega2)]
+        if len(omega2) and omega2.max() > 0:
+            omega = float(np.sqrt(omega2.max()))
+            reason = f"2 / omega, omega = {omega:.4g} /s of the fastest orbit in a node of the tree"
+            found.append(Limit(part.name, "orbit", 2.0 / omega, reason, w))
+    return [min(found, key=lambda limit: limit.dt)] if found else []
 
-    def __init__(self, group: Any = None, G: float = 1.0, softening: float = 0.0):
-        values = {
-            "constant": validate.number(self.name, "G", G),
-            "softening": validate.number(
-                self.name, "softening", softening, minimum=0.0, unit="length"
-            ),
-        }
-        super().__init__(gravity_potential, gravity_force, group, None, values)
 
-    def limits(self, probe: Probe) -> list[Limit]:
-        """By the tide now, by orbits' pericentres, and by passages at the softening length."""
-        limits = probe.response(self) + closest_passage(self, probe)
-        return limits + closest_approach(self, probe)
+def softenings(part: Any, peer: Any, probe: Probe, rows: np.ndarray) -> np.ndarray:
+    """The softening length of each of these particles of a world."""
+    if part.own_softening:
+        return np.asarray(probe.state["softening"].numpy()[rows], float)
+    return np.full(len(rows), peer.parameters["softening"])

@@ -1,0 +1,1 @@
+"""Kernels of sums by a tree: its order, its moments, and the walks through it."""

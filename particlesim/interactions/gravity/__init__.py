@@ -1,0 +1,1 @@
+"""Newton's gravity: between all pairs, or by a tree."""
