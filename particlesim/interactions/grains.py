@@ -28,9 +28,8 @@ def _overlap(r: float, radius_i: float, radius_j: float):
 
 @law
 def _steepness(overlap: float, radius_i: float, radius_j: float, stiffness: float):
-    # Of points no contact: their radii together may be 0.
-    both = wp.max(radius_i + radius_j, 1.0e-30)
-    return stiffness * wp.sqrt(radius_i * radius_j / both * overlap)
+    both = radius_i + radius_j  # of points, which have no contact, 0
+    return stiffness * wp.sqrt(radius_i * radius_j / wp.where(both > 0.0, both, 1.0) * overlap)
 
 
 @law
@@ -49,8 +48,11 @@ def grain_force(
     closing = -wp.dot(relative, x_ij) * inverse
     normal = _normal(k, overlap, closing, dissipation)
     along = relative + x_ij * (closing * inverse)
-    speed = wp.sqrt(wp.max(wp.dot(along, along), 1.0e-20))
-    return x_ij * (normal * inverse) - along * wp.min(sliding * k, friction * normal / speed)
+    square = wp.dot(along, along)
+    slides = square > 0.0
+    most = friction * normal / wp.sqrt(wp.where(slides, square, 1.0))
+    rubbing = wp.where(slides, wp.min(sliding * k, most), 0.0)
+    return x_ij * (normal * inverse) - along * rubbing
 
 
 @law

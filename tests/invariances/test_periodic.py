@@ -16,7 +16,7 @@ IMAGES = np.random.default_rng(3).integers(-2, 3, (COUNT, 3))
 # They know places, which a box has images of, or a medium.
 FIXED = {"ParticleForce", "ConstantForce", "UniformGravity", "Drag"}
 TIED = {
-    "Gravity",
+    "Coulomb",
     "Springs",
     "Bonds",
     "HarmonicBonds",

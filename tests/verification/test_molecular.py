@@ -94,14 +94,16 @@ def test_tails_give_back_what_their_truncation_takes(truncation):
     """Of a uniform fluid, int 2 pi rho u r^2 dr from 0.9 on, by quadrature, is the same for all."""
     rho, cutoff, r = 0.8, 3.0, np.linspace(0.9, 3.0, 20001)
     force = ps.LennardJones(cutoff=cutoff, truncation=truncation)
-    p = force.parameters
-    u = 4 * (r**-12 - r**-6) - p["u_cut"] + (r - cutoff) * p["f_cut"]
-    w = 4 * (12 * r**-12 - 6 * r**-6) - r * p["f_cut"]
+    u_cut = 0.0 if truncation == "cut" else 4 * (cutoff**-12 - cutoff**-6)
+    slope = 4 * (12 * cutoff**-13 - 6 * cutoff**-7)
+    f_cut = slope if truncation == "force_shift" else 0.0
+    u = 4 * (r**-12 - r**-6) - u_cut + (r - cutoff) * f_cut
+    w = 4 * (12 * r**-12 - 6 * r**-6) - r * f_cut
     energy, virial = force.tail(rho)
     # The tail gives back the shift down to r = 0, where the integral here begins at 0.9.
     core, c = 2 * np.pi * rho, 0.9
-    energy -= core * (p["u_cut"] * c**3 / 3 - p["f_cut"] * (c**4 / 4 - cutoff * c**3 / 3))
-    virial -= core * p["f_cut"] * c**4 / 4
+    energy -= core * (u_cut * c**3 / 3 - f_cut * (c**4 / 4 - cutoff * c**3 / 3))
+    virial -= core * f_cut * c**4 / 4
     whole = 8 / 3 * np.pi * rho * (c**-9 / 3 - c**-3), 8 / 3 * np.pi * rho * (4 * c**-9 - 6 * c**-3)
     for f, rest, answer in zip((u, w), (energy, virial), whole, strict=True):
         f = f * r**2

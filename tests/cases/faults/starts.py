@@ -147,7 +147,7 @@ def of_resolution():
             names="mass")
     small = np.array(TWO) * 1e-25
     yield Row("in single precision, lengths of 1e-25", partial(scene, small, ps.Springs([(0, 1)],
-        1.0, 0.5e-25)), never, names="rest_length")
+        1.0, 0.5e-25)), never, names="distances")
     yield Row("a clock of 1e5 periods", partial(scene, [(0, 0, 0)], ps.ParticleForce(laws.shaking,
         omega=2 * np.pi, strength=1.0)), within(0.06, 1.5), 60, {"dt": 0.1, "substeps": 20},
         act=lambda sim, frame: sim.state.time.assign(np.array([1e5 + 0.1 * frame])))
