@@ -114,10 +114,12 @@ def test_every_case_says_what_it_is():
 
 
 ALIKE = {"cloth_10", "grains_200k", "lennard_jones_256k"}  # others' work, in other numbers
+LONG = {"cloth", "cost"}
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in ALIKE)) for name in SMALL]
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name in ALIKE | LONG)) for name in SMALL],
 )
 def test_the_cases_run(name):
     case = load_case(FOLDER / f"{name}.py", SMALL[name])
