@@ -151,9 +151,13 @@ def test_a_cluster_in_equilibrium_stays_as_it_is(device):
 
 @pytest.mark.slow
 def test_galaxies_keep_their_energy(device):
-    _, sim = simulate("galaxy_collision", 0, device, count=5000)
+    _, sim = simulate("galaxy_collision", 0, device, count=5000, softening=0.05)
     before = sim.diagnostics()
-    assert 2 * before.kinetic[0] / -before.potential[0] == pytest.approx(1, abs=0.05)
+    # On a parabola the orbit has 1/12 of either sign. The halos' speeds are those of all the mass
+    # in their profile; a fifth of it lies deeper, in discs of half their scale, and binds by about
+    # half a fifth more.
+    kinetic, potential = before.kinetic[0] - 1 / 12, before.potential[0] + 1 / 12
+    assert 2 * kinetic / -potential == pytest.approx(1, abs=0.1)
     sim.run(150)
     after = sim.diagnostics()
     assert after.energy[0] == pytest.approx(before.energy[0], rel=5e-3)
