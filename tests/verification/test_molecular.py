@@ -171,6 +171,39 @@ def test_energy_fluctuates_with_the_square_of_the_step(device):
     assert spread[0] == pytest.approx(4.3e-4, rel=0.3)
 
 
+def drift(device, precision, steps):
+    """Of an equilibrated liquid: trend of its energy over a run, in parts of it; its momentum."""
+    scene, start = melted("force_shift", device)
+    settings = ps.Settings(
+        dt=0.2, substeps=50, integrator="velocity_verlet", precision=precision
+    )  # dt 0.004
+    sim = ps.Simulation(scene, settings, device=device)
+    sim.position, sim.velocity = start.position, start.velocity - start.velocity.mean(axis=0)
+    found = []
+    for _ in range(steps // 50):
+        sim.step()
+        found.append(sim.diagnostics().energy[0])
+    time = np.linspace(0.0, 1.0, len(found))
+    trend = np.polyfit(time, found, 1)[0] / abs(np.mean(found))
+    return abs(trend), np.abs(sim.diagnostics().momentum[0]).max()
+
+
+def test_energy_does_not_drift(device):
+    # Fluctuations of 4e-5 of the energy leave a line through 160 independent values a trend of
+    # sqrt(12 / 160) of that, 1.1e-5, by chance: four times that in 5 000 steps.
+    trend, momentum = drift(device, "float64", 5_000)
+    assert trend < 4.4e-5
+    assert momentum < 1e-11  # 5 000 kicks of 256 atoms, each right to 1e-16 of forces of 100 dt
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("precision", "allowed"), [("float64", 1e-5), ("float32", 1e-3)])
+def test_energy_does_not_drift_in_a_long_run(precision, allowed, device):
+    trend, momentum = drift(device, precision, 100_000)
+    assert trend < allowed
+    assert momentum < 2e7 * np.finfo(precision).eps  # 1e5 kicks of 256 atoms add up, at most
+
+
 @pytest.mark.slow
 def test_energy_fluctuation_over_160_time_units(device):
     # N 256, rho 0.75, T 1. A step of 0.016, near the limit of stability, heats the liquid and is
