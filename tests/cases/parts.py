@@ -123,6 +123,12 @@ LEFT_OUT = {"break_force", "inequality", "tension_only", "truncation", "inside",
             "smoothing", "dimension", "viscosity", "pivot", "drawn", "mixing", "groups", "exclude",
             "switch", "method", "tolerance", ("Electrostatics", "cutoff"),
             ("Electrostatics", "damping")}  # fmt: skip
+# What is of one machinery is tried by its kin in every run, and itself in the long one.
+KIN = {
+    "HarmonicBonds": "Springs", "FENEBonds": "Bonds", "HarmonicAngles": "Angles",
+    "Mie": "LennardJones", "Yukawa": "PairPotential", "Morse": "PairPotential",
+    "SoftSphere": "PairPotential", "Coulomb": "PairPotential", "Electrostatics": "PairPotential",
+}  # fmt: skip
 BOUND = ("FieldForce",)  # to a grid, which rests in the frame that it is made in
 
 

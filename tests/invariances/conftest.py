@@ -2,7 +2,7 @@
 
 import pytest
 
-KIN = {"HarmonicBonds": "Springs", "FENEBonds": "Bonds", "HarmonicAngles": "Angles"}
+from cases.parts import KIN
 
 
 @pytest.hookimpl(tryfirst=True)  # before those that are marked are left out

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from cases.parts import COUNT, PLAIN, TUPLES, kinds, particles, scene
+from cases.parts import COUNT, KIN, PLAIN, TUPLES, kinds, particles, scene
 from particlesim.scene.part import Interaction
 
 EPS = float(np.finfo(np.float64).eps)
@@ -16,8 +16,6 @@ ORDER = np.random.default_rng(7).permutation(COUNT)
 FORCES = [name for name in kinds() if issubclass(kinds()[name], Interaction)]
 HOLDING = [name for name in kinds() if name not in FORCES]
 # Their kin goes together with all others for those of the same machinery, too.
-KIN = {"HarmonicBonds", "FENEBonds", "HarmonicAngles", "Mie", "Yukawa", "Morse", "SoftSphere",
-       "Coulomb", "Electrostatics"}  # fmt: skip
 APART = [name for name in FORCES if name not in KIN]
 # What knows a place, a direction or a medium of its own takes up momentum.
 EXTERNAL = {"BoxBoundary", "PlaneBoundary", "SphereBoundary", "Boundary", "ConstantForce", "Drag",
