@@ -4,6 +4,7 @@ import functools
 
 import warp as wp
 
+from ..engine.atomics import add_function
 from ..engine.integrate import widened
 from ..engine.loops import Periodicity, box_type, minimum_image
 from ..precision import Precision, register
@@ -17,6 +18,7 @@ def distances_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
     """
     vec3, Box = precision.vec3, box_type(precision)
     image, wide = minimum_image(precision, periodic), widened(precision)
+    add = add_function()
 
     @register
     def count_distances(
@@ -28,18 +30,18 @@ def distances_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
         box: wp.array(dtype=Box),
         x: wp.array(dtype=vec3),
         reach: wp.float64,
-        count_io: wp.array2d(dtype=wp.int64),
+        bins: int,
+        count_io: wp.array(dtype=wp.int64),  # of each bin, world by world
     ):
         k = first + wp.tid()
         i = centres[k]
         w = world[k]
-        bins = count_io.shape[1]
         for n in range(begin[w], begin[w + 1]):
             j = others[n]
             d = wide(image(x[j] - x[i], box[w]))
             r2 = wp.dot(d, d)
             if j != i and r2 < reach * reach:
                 b = int(wp.sqrt(r2) / reach * wp.float64(bins))
-                wp.atomic_add(count_io, w, wp.min(b, bins - 1), wp.int64(1))
+                add(w * bins + wp.min(b, bins - 1), wp.int64(1), count_io)
 
     return count_distances

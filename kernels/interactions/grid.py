@@ -11,8 +11,8 @@ from typing import Any
 
 import warp as wp
 
-from ..precision import Precision, function, native, register, structure
-from ..warp_internals import elements
+from ..engine.atomics import add_function
+from ..precision import Precision, function, register, structure
 
 
 def grid_type(precision: Precision) -> Any:
@@ -33,22 +33,6 @@ def grid_type(precision: Precision) -> Any:
             "held": wp.int32,  # whether it is 0 on its edges
         },
     )
-
-
-def _added() -> wp.Function:
-    """``add(k, value, sums)``: whole numbers, whose sum is the same in any order, for threads."""
-    snippet = f"""
-    long long* at = {elements("sums_io", "long long")} + k;
-#if defined(__CUDA_ARCH__)
-    atomicAdd((unsigned long long*)at, (unsigned long long)value);
-#else
-    __atomic_fetch_add(at, (long long)value, __ATOMIC_RELAXED);
-#endif
-"""
-
-    def add(k: int, value: wp.int64, sums_io: wp.array(dtype=wp.int64)): ...
-
-    return native(add, snippet, after_gradients=False)
 
 
 @functools.cache
@@ -127,7 +111,7 @@ def weight_functions(precision: Precision) -> SimpleNamespace:
 def coupling_kernels(precision: Precision) -> SimpleNamespace:
     """Kernels over particles: put their amounts on the grid; feel the field; the energy of both."""
     vec3, real, Grid = precision.vec3, precision.scalar, grid_type(precision)
-    of, add = weight_functions(precision), _added()
+    of, add = weight_functions(precision), add_function()
     place, row, weight, slope = of.place, of.row, of.weight, of.slope
 
     @register

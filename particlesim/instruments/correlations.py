@@ -65,10 +65,10 @@ def radial_distribution(
     others = centres if other is None else _members(sim, other, owner)
     world, apart = model.world_of[centres], model.world_of[others]
     begin = np.searchsorted(apart, np.arange(model.world_count + 1))
-    count = wp.zeros((model.world_count, bins), dtype=wp.int64, device=model.device)
+    count = wp.zeros(model.world_count * bins, dtype=wp.int64, device=model.device)
     inputs = [
         *(model.array(each.astype(np.int32), wp.int32) for each in (centres, world, others, begin)),
-        model.box, sim.state.position, most, count,
+        model.box, sim.state.position, most, bins, count,
     ]  # fmt: skip
     kernel = distances_kernel(model.precision, model.periodic)
     launch(kernel, len(centres), inputs, model.device)
@@ -78,7 +78,7 @@ def radial_distribution(
     pairs = np.bincount(world, np.diff(begin)[world] - here, model.world_count)
     density = pairs / model.box_length.prod(axis=1)
     expected = density[:, None] * shells
-    found = count.numpy().astype(np.float64)
+    found = count.numpy().astype(np.float64).reshape(-1, bins)
     value = np.divide(found, expected, out=np.zeros_like(found), where=expected > 0)
     return RadialDistribution(0.5 * (edges[1:] + edges[:-1]), value)
 

@@ -15,6 +15,7 @@ import warp as wp
 
 from ...precision import Precision, native, register, structure
 from ...warp_internals import elements
+from ..atomics import rise_function
 from ..loops import Periodicity, box_type, minimum_image
 
 
@@ -125,32 +126,11 @@ def _stayed(precision: Precision, periodic: Periodicity) -> wp.Function:
     return native(stayed, snippet, after_gradients=False)
 
 
-def _raised() -> wp.Function:
-    """``rise(k, value, most)``: entry k becomes value, at least 0, if that is more; for threads."""
-    snippet = f"""
-    // Numbers that are not negative are in the order of their bits.
-    int* at = (int*){elements("most_io", "float")} + k;
-    int bits;
-    memcpy(&bits, &value, sizeof(bits));
-#if defined(__CUDA_ARCH__)
-    if (bits > *at) atomicMax(at, bits);
-#else
-    int now = __atomic_load_n(at, __ATOMIC_RELAXED);
-    while (bits > now && !__atomic_compare_exchange_n(
-        at, &now, bits, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {{}}
-#endif
-"""
-
-    def rise(k: int, value: wp.float32, most_io: wp.array(dtype=wp.float32)): ...
-
-    return native(rise, snippet, after_gradients=False)
-
-
 @functools.cache
 def positions_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
     """Kernel: positions that rows are made from, and how far they are from the last ones."""
     vec3, Box, image = precision.vec3, box_type(precision), minimum_image(precision, periodic)
-    rise = _raised()
+    rise = rise_function()
 
     @register
     def take_positions(
