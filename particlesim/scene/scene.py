@@ -172,8 +172,6 @@ class Scene:
 
     def add_interaction(self, interaction: Interaction) -> Interaction:
         """Add a force; it acts at the start of every substep, in the order of adding."""
-        from .part import Interaction
-
         if not isinstance(interaction, Interaction):
             raise TypeError(
                 f"Scene.add_interaction: interaction must be an Interaction, got {interaction!r}; "
@@ -184,8 +182,6 @@ class Scene:
 
     def add_constraint(self, constraint: ConstraintBase) -> ConstraintBase:
         """Add a constraint; it projects positions after integration, in the order of adding."""
-        from .part import ConstraintBase
-
         if not isinstance(constraint, ConstraintBase):
             raise TypeError(
                 f"Scene.add_constraint: constraint must be a constraint, got {constraint!r}; "
