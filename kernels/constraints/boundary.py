@@ -5,10 +5,10 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
+from ..engine.easing import ease_function, easing_type
 from ..precision import Precision, function, register, structure
 from .boundary_shapes import normals_type
 from .constraints import bodies_type, place_function, rounding_function
-from .easing import ease_function, easing_type
 from .rigid_motion import frame_functions, pose_type
 
 
@@ -48,6 +48,7 @@ def held_type(precision: Precision, sides: int) -> Any:
         "slack": wp.array(dtype=each),
         "marked": wp.array(dtype=wp.int32),  # worlds whose slack is to be measured
         "grip": wp.array(dtype=each),  # empty where nothing rubs
+        "pressed": wp.array(dtype=precision.vec3),  # how far it has moved them in a substep
         "pose": wp.array(dtype=pose_type(precision)),  # by world; empty where nothing moves
     }
     return structure(f"Held{sides}_{precision.name}", fields)
@@ -195,6 +196,7 @@ def begin_kernel(form: Form) -> wp.Kernel:
             if slack[a] > real(0.0):
                 slack[a] = ease(slack[a], h.radius[i], dt, easing)
         h.slack[k] = slack
+        h.pressed[k] = vec3()
         if p.friction > real(0.0):
             h.grip[k] = each()
 
@@ -232,6 +234,7 @@ def project_kernel(form: Form) -> wp.Kernel:
         touched = dx[0] != real(0.0) or dx[1] != real(0.0) or dx[2] != real(0.0)
         if touched and b.w[i] > real(0.0):
             place(i, x, e, dx, b)
+            h.pressed[k] = h.pressed[k] + dx
 
     return project_boundary
 

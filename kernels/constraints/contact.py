@@ -5,10 +5,10 @@ from typing import Any
 
 import warp as wp
 
+from ..engine.easing import ease_function, easing_type
 from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
 from ..precision import Precision, function, register, structure
 from .constraints import bodies_type
-from .easing import ease_function, easing_type
 
 
 def contact_types(precision: Precision) -> tuple[Any, Any]:

@@ -144,8 +144,7 @@ def pair_kernel(
     key = (term, store, precision.name, tuple(periodic), partners, vectorised)
     if key not in _KERNELS:
         types = (data, params, out)
-        make = packed_loop if vectorised else _plain_sums
-        sums = make(term, store, *types, precision, periodic, partners)
+        sums = sums_over_partners(term, store, *types, precision, periodic, partners, vectorised)
         flags = FLAGS[term.rounding] if vectorised else ""
         mark = functools.partial(register, cpu_only=vectorised, flags=flags)
         _KERNELS[key] = _pair_kernel(sums, *types, precision, mark)
@@ -153,6 +152,15 @@ def pair_kernel(
 
 
 _KERNELS: dict[tuple, wp.Kernel] = {}
+
+
+def sums_over_partners(
+    term: Term, store: wp.Function, data: Any, params: Any, out: Any, precision: Precision,
+    periodic: Periodicity, partners: str, vectorised: bool,
+) -> wp.Function:  # fmt: skip
+    """``sums(c, pairs, box, d, p, o)``: the sums of cluster c, handed to ``store``."""
+    make = packed_loop if vectorised else _plain_sums
+    return make(term, store, data, params, out, precision, periodic, partners)
 
 
 def _plain_sums(term, store, data, params, out, precision, periodic, partners) -> wp.Function:

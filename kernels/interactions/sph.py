@@ -47,20 +47,31 @@ def density_term(weight: wp.Function, precision: Precision, data: Any, params: A
 
 
 @functools.cache
+def own_weight(weight: wp.Function, precision: Precision, data: Any, params: Any) -> wp.Function:
+    """``own(i, d, p)``: w(0)."""
+    real = precision.scalar
+
+    def own(i: int, d: data, p: params):
+        return weight(real(0.0))
+
+    return function(own)
+
+
+@functools.cache
 def keep_state(
-    weight: wp.Function, pressure: wp.Function, sound_speed: wp.Function | None,
+    own: wp.Function, pressure: wp.Function, sound_speed: wp.Function | None,
     precision: Precision, data: Any, params: Any, out: Any,
 ) -> wp.Function:  # fmt: skip
     """Store: density and pressure of the particle, and (m, rho, P/rho^2, c) in slot order.
 
-    ``sound_speed`` None leaves c at 0.
+    ``own(i, d, p)`` is what a particle weighs in its own sum; ``sound_speed`` None leaves c at 0.
     """
     real, one, vec4 = precision.scalar, precision.vector(1), precision.vector(4)
     sounds = sound_speed is not None
 
     def keep(i: int, particle: int, total: one, d: data, p: params, o: out):
         m = d.m[i]
-        rho = p.sigma * (total[0] + m * weight(real(0.0)))  # the sum is over the others
+        rho = p.sigma * (total[0] + m * own(i, d, p))  # the sum is over the others
         pressure_i = pressure(rho, p)
         c = real(0.0)
         if wp.static(sounds):
@@ -72,33 +83,47 @@ def keep_state(
     return function(keep)
 
 
+def pull_function(
+    slope: wp.Function, viscosity: wp.Function | None, precision: Precision, data: Any, params: Any
+) -> wp.Function:
+    """``pull(i, j, approach, r2, d, p)``: w of f_ij / m_i = w x_ij, see :func:`force_term`."""
+    real, state_of = precision.scalar, reader(precision, 4)
+    viscous = viscosity is not None
+
+    def pull(i: int, j: int, approach: real, distance2: real, d: data, p: params):
+        state_i = state_of(d.state, i)
+        state_j = state_of(d.state, j)
+        stress = state_i[2] + state_j[2]
+        if wp.static(viscous):
+            mean = real(0.5) * (state_i + state_j)
+            stress += viscosity(approach, distance2, mean[1], mean[3], p)
+        # In this order no factor leaves the range of float32 before the others bring it back.
+        gradient = (state_j[0] * p.sigma) * slope(wp.sqrt(distance2) * p.inverse_h)
+        return (-gradient * stress * p.inverse_h) * p.inverse_h
+
+    return function(pull)
+
+
 def force_term(
-    slope: wp.Function, viscosity: wp.Function | None, dimension: int, precision: Precision,
-    data: Any, params: Any,
-) -> Term:  # fmt: skip
+    pull: wp.Function, moving: bool, dimension: int, precision: Precision, data: Any, params: Any
+) -> Term:
     """Term f_ij / m_i = -m_j (P_i/rho_i^2 + P_j/rho_j^2 + Pi_ij) grad_i W_ij.
 
     grad W vanishes with r, so coincident particles are taken as h apart along a fixed direction,
-    in the order of their slots: they push each other apart, equally and opposite.
+    in the order of their slots: they push each other apart, equally and opposite. ``moving``: the
+    approach counts.
     """
     real, vec3, pair2 = precision.scalar, precision.vec3, precision.vector(2)
-    state_of, velocity_of = reader(precision, 4), reader(precision, 3)
-    viscous = viscosity is not None
+    velocity_of = reader(precision, 3)
 
     def push(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
         apart = r2 > p.closest_squared
         side = wp.where(d.slot[i] < d.slot[j], -p.smoothing_length, p.smoothing_length)
         distance2 = wp.where(apart, r2, p.smoothing_length * p.smoothing_length)
-        state_i = state_of(d.state, i)
-        state_j = state_of(d.state, j)
-        stress = state_i[2] + state_j[2]
-        if wp.static(viscous):
-            v_ij = velocity_of(d.v, i) - velocity_of(d.v, j)
-            mean = real(0.5) * (state_i + state_j)
-            stress += viscosity(wp.dot(v_ij, x_ij), distance2, mean[1], mean[3], p)
-        # In this order no factor leaves the range of float32 before the others bring it back.
-        gradient = (state_j[0] * p.sigma) * slope(wp.sqrt(distance2) * p.inverse_h)
-        w = (-gradient * stress * p.inverse_h) * p.inverse_h
+        approach = real(0.0)
+        if wp.static(moving):
+            approach = wp.dot(velocity_of(d.v, i) - velocity_of(d.v, j), x_ij)
+        w = pull(i, j, approach, distance2, d, p)
         return pair2(w, wp.where(apart, real(0.0), side * w))
 
     return Term(function(push), 3, DIRECTIONS[dimension], "fused")

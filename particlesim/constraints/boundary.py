@@ -12,6 +12,7 @@ from .. import validate
 from ..engine.model import Model
 from ..interactions.laws.arguments import Arguments
 from ..kernels.constraints import boundary_shapes as kernels
+from ..kernels.constraints import walls
 from ..kernels.precision import FLOAT64, Precision, structure
 from ..scene.law import Law
 from ..scene.law import law as make_law
@@ -249,3 +250,7 @@ class Boundary(Holding):
         """Where it is, as a Warp function (see kernels.constraints.boundary_shapes)."""
         law = self.law.function(precision, self.name, float)
         return kernels.distance_function(law, tuple(self.parameters), precision, self.Params)
+
+    def facing(self, precision: Precision, params: Any) -> wp.Function:
+        law = self.law.function(precision, self.name, float)
+        return walls.distance_facing(law, tuple(self.parameters), precision, params)

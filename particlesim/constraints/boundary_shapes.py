@@ -13,6 +13,7 @@ from ..engine.limit import Limit
 from ..engine.model import Model
 from ..engine.probe import Probe
 from ..kernels.constraints import boundary_shapes as kernels
+from ..kernels.constraints import walls
 from ..kernels.precision import Precision
 from ..scene.law import law
 from .boundary import STILL, Boundary
@@ -69,6 +70,9 @@ class PlaneBoundary(Boundary):
 
     def surface(self, precision: Precision) -> wp.Function:
         return kernels.plane_function(precision, self.Params)
+
+    def facing(self, precision: Precision, params: Any) -> wp.Function:
+        return walls.plane_facing(precision, params)
 
     def _geometry(self) -> dict[str, Any]:
         return {"point": self.point, "normal": self.normal}
@@ -128,6 +132,7 @@ class BoxBoundary(Boundary):
 
     law = _room
     sides = 3
+    places = (0, 0, 1, 1, 2, 2)
 
     def __init__(
         self, lower: Sequence[float], upper: Sequence[float], friction: float = 0.0,
@@ -159,6 +164,9 @@ class BoxBoundary(Boundary):
 
     def surface(self, precision: Precision) -> wp.Function:
         return kernels.box_function(precision, self.Params)
+
+    def facing(self, precision: Precision, params: Any) -> wp.Function:
+        return walls.box_facing(precision, params)
 
     def _geometry(self) -> dict[str, Any]:
         return {"lower": self.lower, "upper": self.upper}
@@ -235,6 +243,9 @@ class SphereBoundary(Boundary):
 
     def surface(self, precision: Precision) -> wp.Function:
         return kernels.sphere_function(precision, self.Params)
+
+    def facing(self, precision: Precision, params: Any) -> wp.Function:
+        return walls.sphere_facing(precision, params)
 
     def _geometry(self) -> dict[str, Any]:
         return {"center": self.center, "radius": self.radius, "inside": int(self.inside)}

@@ -10,6 +10,7 @@ import numpy as np
 import warp as wp
 
 from .. import validate
+from ..engine.easing import Easing
 from ..engine.execution.launch import call, launch, when
 from ..engine.limit import Limit
 from ..engine.model import Model
@@ -21,7 +22,7 @@ from ..kernels.constraints import contact_terms as terms
 from ..kernels.constraints.constraints import bodies_type
 from ..kernels.engine.loops import Term
 from ..kernels.interactions.pair import pair_kernel
-from .easing import EasedConstraint, Easing
+from .easing import EasedConstraint
 from .limits import contact_limits
 from .tuples import bodies
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import warp as wp
 
+from ..engine.easing import Easing
 from ..engine.execution.launch import call, launch
 from ..engine.model import Model
 from ..engine.neighbors.lists import Neighbors
@@ -15,7 +17,9 @@ from ..engine.state import State
 from ..kernels.constraints import boundary as kernels
 from ..kernels.constraints.rigid_motion import motion_type, pose_kernel, pose_type
 from ..kernels.precision import Precision
-from .easing import EasedConstraint, Easing
+from ..scene.part import Part
+from ..scene.wall import Wall
+from .easing import EasedConstraint
 from .tuples import bodies
 
 
@@ -23,10 +27,16 @@ class Holding(EasedConstraint):
     """Base of :class:`~particlesim.constraints.boundary.Boundary`, which describes what holds."""
 
     requires = frozenset({"position", "velocity", "inverse_mass", "radius", "correction"})
+    solid = True
     sides = 1  # at most how many of them a particle touches at once
+    places: tuple[int, ...] = (0,)  # see Wall
 
     def surface(self, precision: Precision) -> wp.Function:
         """Where it is, as a Warp function (see kernels.constraints.boundary_shapes)."""
+        raise NotImplementedError
+
+    def facing(self, precision: Precision, params: Any) -> wp.Function:
+        """How far its sides are, as a Warp function (see kernels.constraints.walls)."""
         raise NotImplementedError
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
@@ -39,11 +49,7 @@ class Holding(EasedConstraint):
         self.held.particle = model.array(members, wp.int32)
         self.worlds_held = model.world_of[members]
         self.held.world = model.array(self.worlds_held, wp.int32)
-        rows = [
-            {**peer._geometry(), "friction": peer.friction, "restitution": peer.restitution}
-            for peer in self.peers
-        ]
-        columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        columns = self._columns(["friction", "restitution"])
         model.fits(self.name, columns)
         radii = model.column("radius")[members]
         model.squares_fit(self.name, "radius", np.concatenate([radii, model.apart()[0]]))
@@ -52,6 +58,32 @@ class Holding(EasedConstraint):
         self.moving = any(peer.moves for peer in self.peers)
         if self.moving:
             self.requires = self.requires | {"time"}
+
+    def _columns(self, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """What the surface takes, and these values of the boundary, in every world."""
+        rows = [
+            {**peer._geometry(), **{name: getattr(peer, name) for name in names}}
+            for peer in self.peers
+        ]
+        return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+    def wall(self, model: Model, state: State) -> Wall:
+        """What it is to a continuum."""
+        name, precision = type(self).__name__, model.precision
+        Params, params = model.parameters(f"{name}Wall", self._columns(["friction"]))
+        moving = any(peer.moves for peer in self.peers)
+        count = model.world_count if moving else 0
+        pose = wp.zeros(count, dtype=pose_type(precision), device=model.device)
+        motion = self._motion(model) if moving else None
+
+        def follow() -> None:
+            if moving:
+                launch(pose_kernel(precision), count, [motion, state.time, pose], model.device)
+
+        return Wall(
+            self.name, self.peers, self.places, self.facing(precision, Params), Params, params,
+            pose, follow,
+        )  # fmt: skip
 
     def attach(self, model: Model, state: State) -> None:
         if not self.count:
@@ -62,6 +94,7 @@ class Holding(EasedConstraint):
         self.easing = Easing(model, self.count, each, ends=1)
         self.held.radius = state.radius
         self.held.slack, self.held.marked = self.easing.slack, self.easing.marked
+        self.held.pressed = wp.zeros(self.count, dtype=precision.vec3, device=device)
         if self.rough:
             self.held.grip = wp.zeros(self.count, dtype=each, device=device)
         if self.moving:
@@ -77,8 +110,16 @@ class Holding(EasedConstraint):
         self.bounce_kernel = kernels.bounce_kernel(self.form, forces)
 
     def _attach_motion(self, state: State) -> None:
-        """The motions of all worlds, and room for where they have led."""
+        """The motions, and room for where they have led."""
         model = self.model
+        self.motion = self._motion(model)
+        self.clock = state.time
+        self.held.pose = wp.zeros(
+            model.world_count, dtype=pose_type(model.precision), device=model.device
+        )
+
+    def _motion(self, model: Model) -> wp.array:
+        """How it moves in every world."""
         carried = [peer._carried() for peer in self.peers]
         columns = {
             "velocity": [peer.velocity for peer in self.peers],
@@ -87,12 +128,8 @@ class Holding(EasedConstraint):
             "turn": [turn for _, turn in carried],
             "pivot": [peer._pivot() for peer in self.peers],
         }
-        self.motion = model.structures(
+        return model.structures(
             motion_type(), {name: np.array(rows) for name, rows in columns.items()}
-        )
-        self.clock = state.time
-        self.held.pose = wp.zeros(
-            model.world_count, dtype=pose_type(model.precision), device=model.device
         )
 
     def complaint(self) -> str:
@@ -127,3 +164,14 @@ class Holding(EasedConstraint):
     def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if self.count and self.bouncing and dt > 0:
             self._launch(self.bounce_kernel, self.force, dt, 1.0 / dt)
+
+    def read_force(self, part: Part) -> np.ndarray:
+        """What particles exert that touch it, -sum m dx / dt^2 of the last substep, (worlds, 3)."""
+        model, found = self.model, np.zeros((len(self.peers), 3))
+        if self.count:
+            mass = model.column("mass")[self.members]
+            way = self.held.pressed.numpy().astype(np.float64) * mass[:, None]
+            for axis in range(3):
+                sums = np.bincount(self.worlds_held, way[:, axis], len(found))
+                found[:, axis] = -sums / model.settings.substep**2
+        return found[[part is self or part is peer for peer in self.peers]]

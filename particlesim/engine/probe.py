@@ -14,8 +14,8 @@ from .execution.acting import Attributes, act
 from .limit import Limit
 from .loop import Loop
 from .model import Model
-from .rates import Rates, implicit_rates, turns
-from .spectrum import Largest, largest, size_of
+from .rates.rates import Rates, implicit_rates, turns
+from .rates.spectrum import Largest, largest, size_of
 
 STEPS, LEAST = 30, 4  # applications of a Jacobian
 WORK = 2e7  # particles and pairs that forces are evaluated for

@@ -16,7 +16,7 @@ from ..constraints.constraint import Constraint
 from ..engine.limit import Limit
 from ..engine.loop import Loop
 from ..engine.probe import Probe
-from ..engine.rates import Rates
+from ..engine.rates.rates import Rates
 from ..engine.report import Report, grid
 from ..interactions.fusion import fuse
 from ..scene.scene import Scene

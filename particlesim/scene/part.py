@@ -177,6 +177,9 @@ class Interaction(Part):
         ``apply`` may be called at any time, and leaves that as it is.
         """
 
+    def presses(self, wall: Part) -> Any:
+        """What it exerts on a solid constraint by itself, (worlds, 3); None: nothing."""
+
     def follow(self, state: Any, damps: bool) -> None:
         """Add (df/dv) u, by which the force differs where the velocity is u ahead.
 
@@ -258,6 +261,12 @@ class ConstraintBase(Part):
         >>> sim.position.round(5).tolist(), sim.velocity.round(5).tolist()
         ([[3.0, 0.5, 0.0]], [[3.0, 0.0, 0.0]])
     """
+
+    solid = False  # it is what holds a continuum, and has ``wall``
+
+    def wall(self, model: Any, state: Any) -> Any:
+        """A :class:`~particlesim.scene.wall.Wall`, if it is solid; also before ``prepare``."""
+        raise validate.undefined(self, "wall(self, model, state)")
 
     def begin(self, state: Any, neighbors: Any, dt: float) -> None:
         """At the start of a substep's projection."""

@@ -111,19 +111,30 @@ class Reading(Access):
         return self.loop.bound("Simulation.field", part).read_field(part)
 
     def force(self, constraint: ConstraintBase) -> np.ndarray:
-        """Estimated force on the end that feels most of each tuple, |lam| |grad C| / dt^2 [force].
+        """Force by, or on, a constraint, of the last substep [force].
 
         Args:
             constraint: Of the scene, or one of :attr:`constraints`.
 
         Returns:
-            (m,), of the last substep, in the order of its tuples; world by world where it stands
-            for several.
+            Of a constraint on tuples the estimate on the end that feels most, |lam| |grad C| /
+            dt^2, (m,), in the order of its tuples; world by world where it stands for several. Of a
+            boundary what particles exert on it, (3,), or (worlds, 3) where it stands for several:
+            those that touch it, and fluids, which also press on it from some way off.
 
         Raises:
-            ValueError: It is no part of this simulation, or no constraint on tuples.
+            ValueError: It is no part of this simulation, or neither of these.
         """
-        return self.loop.bound("Simulation.force", constraint).read_force(constraint)
+        bound = self.loop.bound("Simulation.force", constraint)
+        found = bound.read_force(constraint)
+        if not bound.solid:
+            return found
+        chosen = [constraint is bound or constraint is peer for peer in bound.peers]
+        pressing = [each.presses(bound) for each in self.interactions]
+        for each in pressing:
+            if each is not None:
+                found = found + each[chosen]
+        return found[0] if len(found) == 1 else found
 
     def broken(self, constraint: ConstraintBase) -> np.ndarray:
         """Which tuples of a constraint have broken, (m,) bool, like :meth:`force`."""

@@ -9,7 +9,7 @@ import warp as wp
 import particlesim as ps
 from cases.stability import chain, limit, oscillator, simulation
 from particlesim.engine.limit import Limit, explicit_step
-from particlesim.engine.spectrum import largest
+from particlesim.engine.rates.spectrum import largest
 from particlesim.interactions.bonded.harmonic_bonds import spring_bound
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, cast
 
 import numpy as np
 import warp as wp
@@ -16,13 +17,15 @@ from ...engine.neighbors.verlet import VerletList
 from ...engine.probe import Probe
 from ...engine.state import State
 from ...kernels.interactions import sph as kernels
-from ...scene.part import Interaction
+from ...scene.part import Interaction, Part
 from ..pair_loop import PairLoop
 from .equations_of_state import EquationOfState
+from .lattice import lattice_sums, spacings
 from .limits import fluid_limits
 from .smoothing import SMOOTHING, SUPPORT
 from .starts import complaint
 from .viscosities import Viscosity
+from .walls import Pass, Walls
 
 # What laws may name beside smoothing_length, rest_density and the parameters of their part.
 VARIABLES = {
@@ -47,6 +50,13 @@ class SPH(Interaction):
 
     The step is bounded by the time of sound across a smoothing length and by the acceleration
     (Monaghan 1992, on time stepping): dt < 0.4 h / (c (1 + 0.6 alpha)) and dt < 0.25 sqrt(h / |a|).
+
+    Over particles of mass rho0 s^d on a square lattice of spacing s the sum is a little more
+    than rho0. A fluid that starts there rests there: its equation of state is given the sum for
+    the rest density.
+
+    Boundaries that hold the fluid are mirrors of it: images of its particles hold it up, and let
+    it slip (:class:`~particlesim.interactions.fluid.walls.Walls`).
 
     A run warns of a start whose masses do not make the rest density at their spacing, whose
     smoothing length is below the spacing, or which moves faster than a liquid's sound.
@@ -146,12 +156,16 @@ class SPH(Interaction):
         self.model = model
         columns = self.columns(self.parameters)
         h = columns["smoothing_length"]
-        pairs = neighbors.of(self, {"mass"} | ({"velocity"} if self.viscosity else set()))
-        assert isinstance(pairs, VerletList)  # as there is a cutoff
-        self.pairs = pairs
+        names = {"mass"} | ({"velocity"} if self.viscosity else set())
+        self.pairs = cast(VerletList, neighbors.of(self, names))  # as there is a cutoff
+        self.walls = Walls(self, model)
+        self.requires = self.requires | self.walls.requires
         columns["inverse_h"] = 1.0 / h
         with np.errstate(divide="ignore", over="ignore", under="ignore"):
             columns["sigma"] = self.smoothing.sigma / h**self.dimension
+        self.spacings = spacings(self, model)
+        if "rest_density" in columns:
+            columns["rest_density"] = columns["rest_density"] * lattice_sums(self, model, h)
         columns |= {"cutoff_squared": (SUPPORT * h) ** 2, "closest_squared": (COINCIDENT * h) ** 2}
         self._check_range(columns)
         model.fits(self.name, {name: columns[name] for name in self.parameters})
@@ -171,20 +185,27 @@ class SPH(Interaction):
                 )  # fmt: skip
 
     def attach(self, model: Model, state: State) -> None:
-        precision, own = model.precision, self.pairs.fields
+        precision, held = model.precision, self.pairs.fields
         # Mass, density, P / rho^2 and sound speed of each slot, together as they are read together.
         self.slot_state = self.pairs.array(precision.vector(4))
-        fields = {"x": own["position"], "m": own["mass"], "state": self.slot_state}
-        if self.viscosity is not None:
-            fields["v"] = own["velocity"]
-        self.loop = PairLoop.over(model, self.pairs, "Fluid", fields, self.Params, self.params)
+        fields = {"x": held["position"], "m": held["mass"], "state": self.slot_state}
+        moving = self.viscosity is not None
+        if moving:
+            fields["v"] = held["velocity"]
         self.state = state
         self.laws = self._laws()
         self.weight = self.smoothing.weight.function(precision)
-        types = precision, self.loop.Data, self.Params
-        self.density_term = kernels.density_term(self.weight, *types)
-        slope = self.smoothing.slope.function(precision)
-        self.force_term = kernels.force_term(slope, self.laws.get("term"), self.dimension, *types)
+        self.loop = PairLoop.over(model, self.pairs, "Fluid", fields, self.Params, self.params)
+        self._types = own = precision, self.loop.Data, self.Params
+        self.density_term = kernels.density_term(self.weight, *own)
+        self.force_term = kernels.force_term(self.pull(*own), moving, self.dimension, *own)
+        if self.walls:
+            self.walls.attach(state, fields)
+
+    def pull(self, *types: Any) -> wp.Function:
+        """How strongly a pair pulls, for data and parameters of these types."""
+        slope = self.smoothing.slope.function(self.model.precision)
+        return kernels.pull_function(slope, self.laws.get("term"), *types)
 
     def _laws(self) -> dict[str, wp.Function]:
         """The parts' laws as functions of their variables and the fluid's parameters."""
@@ -201,15 +222,36 @@ class SPH(Interaction):
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         self._sum_density(state)
-        self.loop.sum(self.force_term, kernels.add_force, {"f": state.force})
+        out = {"f": state.force}
+        self.walls.sum_force(Pass(self.loop, self.force_term, kernels.add_force, out))
 
     def _sum_density(self, state: State, sounds: bool = False) -> None:
         """Density, pressure and their slots; speeds of sound for a viscosity, or if asked for."""
         sounds = sounds or self.viscosity is not None
         laws = self.laws["pressure"], self.laws["sound_speed"] if sounds else None
-        store = functools.partial(kernels.keep_state, self.weight, *laws)
         out = {"state": self.slot_state, "rho": state.density, "pressure": state.pressure}
-        self.loop.sum(self.density_term, store, out)
+        own = kernels.own_weight(self.weight, *self._types)
+        store = functools.partial(kernels.keep_state, own, *laws)
+        self.walls.sum_density(Pass(self.loop, self.density_term, store, out), laws)
+
+    def advance(self, state: State, dt: float) -> None:
+        if self.walls:
+            self.walls.ease(dt)
+
+    def persistent(self) -> dict[str, wp.array]:
+        return self.walls.easing.persistent() if self.walls else {}
+
+    def placed(self, worlds: Iterable[int]) -> None:
+        if self.walls:
+            self.walls.easing.mark(worlds)
+
+    reset = placed
+
+    def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
+        return self.walls.worlds(name) if name == "slack" else super().worlds(name, array)
+
+    def presses(self, wall: Part) -> np.ndarray | None:
+        return self.walls.pressed(wall) if self.walls else None
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By sound with viscosity, and by acceleration."""

@@ -1,0 +1,247 @@
+"""Walls of a fluid by the method of images: terms of pairs with all of their images.
+
+A particle j that is d_j in front of a flat wall has an image as far behind it. Of it a particle i,
+d_i in front, is at r'^2 = r^2 + 4 d_i d_j, nearer than the support only where j itself is: the
+loop over the neighbours of i meets all of its images. Where walls stand at right angles to each
+other, images of images add up: r'^2 = r^2 + 4 sum_a d_ia d_ja for every set of walls. The pairs of
+a fluid and of its images have an energy, whose gradient
+
+    grad_i r'^2 / 2 = x_ij + 2 sum_a d_ja n_a
+
+is taken as it is, along the normals n_a where i is, also of a wall that is curved. What approaches
+does so at d(r'^2 / 2)/dt = v_ij . x_ij + 2 sum_a (d_ia' d_ja + d_ia d_ja').
+
+Clusters of slots that no wall is near to go by the plain terms.
+"""
+
+import functools
+import itertools
+from typing import Any
+
+import warp as wp
+
+from ..engine.loops import Pairs, Periodicity, Term, box_type, reader
+from ..engine.packed import FLAGS
+from ..precision import Precision, function, function_from_source, register
+from .pair import sums_over_partners
+from .walls import near_type
+
+
+def sets(total: int) -> list[tuple[int, ...]]:
+    """Every set of places of walls that makes an image."""
+    sizes = range(1, total + 1)
+    return [each for size in sizes for each in itertools.combinations(range(total), size)]
+
+
+def _squares(total: int) -> list[str]:
+    """Source of 4 d_i d_j by place."""
+    return [f"e{a} = real(4.0) * D_i[{a}] * D_j[{a}]" for a in range(total)]
+
+
+def _weights(total: int) -> list[str]:
+    """Source that adds w(q') of all images to ``found``."""
+    squares = [" + ".join(f"e{a}" for a in each) for each in sets(total)]
+    added = [f"found += weight(wp.sqrt(r2 + {square}) * p.inverse_h)" for square in squares]
+    return [*_squares(total), *added]
+
+
+def density_term(
+    weight: wp.Function, total: int, precision: Precision, data: Any, params: Any
+) -> Term:
+    """Term m_j (w(q) + sum w(q')), the density without the normalisation of W."""
+    lines = [
+        "D_i = read(d.wall, i)",
+        "D_j = read(d.wall, j)",
+        "found = weight(wp.sqrt(r2) * p.inverse_h)",
+        *_weights(total),
+    ]
+    names = {"weight": weight, "mass": reader(precision)}
+    sums = "mass(d.m, j) * found"
+    return _term("add_images", lines, sums, 1, total, names, precision, data, params)
+
+
+@functools.cache
+def own_weight(
+    weight: wp.Function, total: int, precision: Precision, data: Any, params: Any
+) -> wp.Function:
+    """``own(i, d, p)``: w(0), and w(q') of the images that a particle has of itself."""
+    lines = ["D_i = d.wall[i]", "D_j = D_i", "r2 = real(0.0)", "found = weight(r2)"]
+    lines += _weights(total)
+    header, names = "own(i: int, d: Data, p: Params)", {"weight": weight}
+    return _function(header, lines, "found", total, names, precision, data, params)
+
+
+def force_term(
+    pull: wp.Function, total: int, direction: tuple[float, float, float], moving: bool,
+    precision: Precision, data: Any, params: Any,
+) -> Term:  # fmt: skip
+    """Term (sum of w x_ij; of 2 d_ja w by place) over a pair and its images.
+
+    Args:
+        pull: w(i, j, approach, r2, d, p) of one pair (see :mod:`.sph`).
+        total: Places of walls.
+        direction: Of coincident particles.
+        moving: The approach counts.
+        precision: Of the simulation.
+        data: Struct with ``wall`` and, where the approach counts, ``v`` and ``rate``.
+        params: Struct of the fluid's parameters.
+    """
+    lines = [
+        "apart = r2 > p.closest_squared",
+        "side = wp.where(d.slot[i] < d.slot[j], -p.smoothing_length, p.smoothing_length)",
+        "distance2 = wp.where(apart, r2, p.smoothing_length * p.smoothing_length)",
+        *_pair(total, moving),
+        "g = pull(i, j, approach, distance2, d, p)",
+        "aside = direction * wp.where(apart, real(0.0), side * g)",
+        *_pulls(total, moving, "j", "real(2.0) * D_j[{a}]", ["g += g{n}"]),
+        "f = x_ij * g + aside",
+    ]
+    sums = ", ".join([*(f"f[{c}]" for c in range(3)), *(f"b{a}" for a in range(total))])
+    names = {"pull": pull, "direction": precision.vec3(*direction)}
+    return _term("push_images", lines, sums, 3 + total, total, names, precision, data, params)
+
+
+def press_term(
+    pull: wp.Function, total: int, moving: bool, precision: Precision, data: Any, params: Any
+) -> Term:
+    """Term of (d_ia + d_ja) w by place: what the images of a pair have along a wall's normal."""
+    lines = [*_pair(total, moving), *_pulls(total, moving, "j", "(D_i[{a}] + D_j[{a}])", [])]
+    sums = ", ".join(f"b{a}" for a in range(total))
+    return _term("press", lines, sums, total, total, {"pull": pull}, precision, data, params)
+
+
+@functools.cache
+def own_push(
+    pull: wp.Function, total: int, moving: bool, precision: Precision, data: Any, params: Any
+) -> wp.Function:
+    """``own(i, d, p)``: of 2 d_ia w by place the sum over the images of a particle of itself."""
+    lines = ["D_i = d.wall[i]", "D_j = D_i", "r2 = real(0.0)", "approach = real(0.0)"]
+    if moving:
+        lines += ["R_i = d.rate[i]", "R_j = R_i"]
+    lines += _pulls(total, moving, "i", "real(2.0) * D_i[{a}]", [])
+    result = f"each({', '.join(f'b{a}' for a in range(total))})"
+    names = {"pull": pull, "each": precision.vector(total)}
+    header = "own(i: int, d: Data, p: Params)"
+    return _function(header, lines, result, total, names, precision, data, params)
+
+
+def _pair(total: int, moving: bool) -> list[str]:
+    """Source of how far walls are from both particles, and of how fast these approach."""
+    lines = ["D_i = read(d.wall, i)", "D_j = read(d.wall, j)"]
+    if not moving:
+        return [*lines, "approach = real(0.0)"]
+    rates = ["R_i = read(d.rate, i)", "R_j = read(d.rate, j)"]
+    return [*lines, *rates, "approach = wp.dot(velocity(d.v, i) - velocity(d.v, j), x_ij)"]
+
+
+def _pulls(total: int, moving: bool, j: str, arm: str, also: list[str]) -> list[str]:
+    """Source of w of every image, which b of each of its places takes up along an ``arm``."""
+    places = range(total)
+    lines = [*_squares(total), *(f"b{a} = real(0.0)" for a in places)]
+    if moving:
+        lines += [f"u{a} = real(2.0) * (R_i[{a}] * D_j[{a}] + D_i[{a}] * R_j[{a}])" for a in places]
+    for n, each in enumerate(sets(total)):
+        closing = "".join(f" + u{a}" for a in each) if moving else ""
+        square = "".join(f" + e{a}" for a in each)
+        lines.append(f"g{n} = pull(i, {j}, approach{closing}, r2{square}, d, p)")
+        lines += [line.format(n=n) for line in also]
+        lines += [f"b{a} += {arm.format(a=a)} * g{n}" for a in each]
+    return lines
+
+
+def _term(
+    name: str, lines: list[str], sums: str, width: int, total: int, names: dict[str, Any],
+    precision: Precision, data: Any, params: Any,
+) -> Term:  # fmt: skip
+    header = f"{name}(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: Params)"
+    names = {**names, "sums": precision.vector(width)}
+    made = _function(header, lines, f"sums({sums})", total, names, precision, data, params)
+    return Term(made, width, rounding="fused")
+
+
+def _function(
+    header: str, lines: list[str], result: str, total: int, names: dict[str, Any],
+    precision: Precision, data: Any, params: Any,
+) -> wp.Function:  # fmt: skip
+    source = "\n    ".join([f"def {header}:", *lines, f"return {result}"]) + "\n"
+    known = {
+        "wp": wp, "real": precision.scalar, "vec3": precision.vec3, "Data": data, "Params": params,
+        "read": reader(precision, total), "velocity": reader(precision, 3),
+    }  # fmt: skip
+    return function_from_source(source, {**known, **names})
+
+
+@functools.cache
+def keep_press(
+    own: wp.Function, first: int, last: int, total: int, precision: Precision, data: Any,
+    params: Any, out: Any,
+) -> wp.Function:  # fmt: skip
+    """Store: the force on each particle by the walls in places ``first`` to ``last``."""
+    vec3, each = precision.vec3, precision.vector(total)
+
+    def keep_wall_force(i: int, particle: int, found: each, d: data, p: params, o: out):
+        b = own(i, d, p)
+        N = o.normal[i]
+        f = vec3()
+        for k in range(wp.static(first), wp.static(last)):
+            f = f + vec3(N[k, 0], N[k, 1], N[k, 2]) * (found[k] + b[k])
+        o.pressed[i] = f * d.m[i]
+
+    return function(keep_wall_force)
+
+
+@functools.cache
+def add_force(
+    own: wp.Function, total: int, precision: Precision, data: Any, params: Any, out: Any
+) -> wp.Function:
+    """Store: f += m_i (sum + normals of the walls times theirs); ``own`` is of :func:`own_push`."""
+    vec3, sums = precision.vec3, precision.vector(3 + total)
+
+    def add_walled_force(i: int, particle: int, found: sums, d: data, p: params, o: out):
+        a = vec3(found[0], found[1], found[2])
+        b = own(i, d, p)
+        N = o.normal[i]
+        for k in range(wp.static(total)):
+            a = a + vec3(N[k, 0], N[k, 1], N[k, 2]) * (found[3 + k] + b[k])
+        o.f[particle] = o.f[particle] + d.m[i] * a
+
+    return function(add_walled_force)
+
+
+@functools.cache
+def walled_kernel(
+    plain: tuple[Term, wp.Function, Any, Any], walled: tuple[Term, wp.Function, Any, Any],
+    params: Any, precision: Precision, periodic: Periodicity, partners: str, vectorised: bool,
+    total: int,
+) -> wp.Kernel:  # fmt: skip
+    """Kernel: sum over partners by one term where no wall is near, and by another where one is.
+
+    Both are (term, store, struct of data, struct of outputs), as of ``pair_kernel``.
+    """
+    Box, Near = box_type(precision), near_type(precision, total)
+    where = precision, periodic, partners, vectorised
+    sums = sums_over_partners(plain[0], plain[1], plain[2], params, plain[3], *where)
+    near_sums = sums_over_partners(walled[0], walled[1], walled[2], params, walled[3], *where)
+    Data, Out, NearData, NearOut = plain[2], plain[3], walled[2], walled[3]
+    flags = FLAGS["fused"] if vectorised else ""
+
+    @functools.partial(register, cpu_only=vectorised, flags=flags)
+    def sum_beside_walls(
+        first: int,
+        pairs: Pairs,
+        box: wp.array(dtype=Box),
+        parameters: wp.array(dtype=params),
+        d: Data,
+        o: Out,
+        near: Near,
+        near_d: NearData,
+        near_o: NearOut,
+    ):
+        c = first + wp.tid()
+        w = pairs.world[pairs.lead[c]]
+        if near.near[c] != 0:
+            near_sums(c, pairs, box[w], near_d, parameters[w], near_o)
+        else:
+            sums(c, pairs, box[w], d, parameters[w], o)
+
+    return sum_beside_walls

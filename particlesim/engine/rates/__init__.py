@@ -1,0 +1,1 @@
+"""How fast forces answer: rates, and the largest eigenvalues that they follow from."""

@@ -1,0 +1,214 @@
+"""Walls of a fluid: boundaries that hold it up by its own pressure."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import warp as wp
+
+from ...engine.easing import Easing
+from ...engine.execution.launch import call, launch, when
+from ...engine.model import Model, filled, structure_of
+from ...engine.state import State
+from ...kernels.interactions import images
+from ...kernels.interactions import walls as kernels
+from ...kernels.interactions.sph import DIRECTIONS, keep_state
+from ...scene.group import select
+from ...scene.part import ConstraintBase, Part
+from ..pair_loop import PairLoop
+
+MOST = 4  # places of walls: each doubles the images
+
+
+class Pass(NamedTuple):
+    """What of a pass over pairs differs beside walls: a loop, its term, a store and what it writes.
+
+    See :meth:`~particlesim.interactions.pair_loop.PairLoop.sum`.
+    """
+
+    loop: PairLoop
+    term: Any
+    store: Any
+    out: Mapping[str, wp.array]
+
+
+class Walls:
+    """The boundaries that hold particles of a fluid, which see their images in them.
+
+    The fluid beyond a wall is its own mirror image (Libersky and Petschek 1991; Morris et al.
+    1997), without particles of its own (see :mod:`particlesim.kernels.interactions.images`).
+
+    A side to which a start has placed particles nearer than half a spacing gives way by as much, at
+    most by a spacing, and comes back slowly, as overlaps of contacts do: a tank that is no whole
+    number of spacings wide does not burst.
+
+    Sides of boundaries take places: the three axes of a box one each, every other boundary one. Of
+    more than four places walls share the last, and there a particle sees the nearest.
+
+    Args:
+        fluid: A bound ``SPH``.
+        model: Its worlds.
+    """
+
+    def __init__(self, fluid: Any, model: Model):
+        self.fluid, self.model = fluid, model
+        kinds = zip(*(scene.constraints for scene in model.scenes), strict=True)
+        bound = [peers[0].bind(peers) for peers in kinds if peers[0].solid]
+        held = [(part, _held(model, fluid, part)) for part in bound]
+        self.held = [(part, flags) for part, flags in held if flags.any()]
+        peers = [peer for part, _ in self.held for peer in part.peers]
+        self.requires = {"time"} if any(peer.moves for peer in peers) else set()
+
+    def __bool__(self) -> bool:
+        return bool(self.held)
+
+    def attach(self, state: State, fields: Mapping[str, wp.array]) -> None:
+        """Make the arrays and the terms; ``fields`` are what those of the fluid read."""
+        moving = "v" in fields  # what approaches a wall counts
+        model, precision = self.model, self.model.precision
+        self.walls = [part.wall(model, state) for part, _ in self.held]
+        self.flags = [model.array(flags, wp.int32) for _, flags in self.held]
+        self.places, first = list[tuple[int, ...]](), 0
+        for wall in self.walls:
+            self.places.append(tuple(min(first + place, MOST - 1) for place in wall.places))
+            first = max(self.places[-1]) + 1
+        self.total = min(first, MOST)
+        pairs, each = self.fluid.pairs, precision.vector(self.total)
+        self.distance = pairs.array(each)
+        self.rate = pairs.array(each) if moving else None
+        none = wp.empty(0, dtype=each, device=model.device)
+        self.struct = kernels.near_type(precision, self.total)()
+        self.struct.distance = self.distance
+        self.struct.rate = none if self.rate is None else self.rate
+        self.normal = pairs.array(kernels.normals_of(precision, self.total))
+        self.struct.normal = self.normal
+        self.struct.near = wp.zeros(pairs.rows, dtype=wp.int32, device=model.device)
+        # Of every side in every world how far it gives way to the start.
+        sides = [len(wall.places) for wall in self.walls]
+        self.stride, self.begins = sum(sides), np.cumsum([0, *sides])[:-1].tolist()
+        self.easing = Easing(model, model.world_count * self.stride, wp.float32, ends=1)
+        self.rest = model.array(0.5 * self.fluid.spacings, precision.scalar)
+        self._make_terms(fields, moving)
+
+    def ease(self, dt: float) -> None:
+        """The slack of the start runs out."""
+        if dt <= 0:
+            return
+        easing = self.easing
+        inputs = [self.rest, easing.struct, dt, self.stride, easing.slack]
+        kernel = kernels.ease_kernel(self.model.precision)
+        launch(kernel, len(easing.slack), inputs, self.model.device)
+        call(easing.unmark)
+
+    def worlds(self, name: str) -> np.ndarray | None:
+        """The world of each row of the slack."""
+        every = np.arange(self.model.world_count)
+        return np.repeat(every, self.stride) if name == "slack" else None
+
+    def _make_terms(self, fields: Mapping[str, wp.array], moving: bool) -> None:
+        model, fluid, total = self.model, self.fluid, self.total
+        rate = {} if self.rate is None else {"rate": self.rate}
+        beside = {**fields, "wall": self.distance, **rate}
+        given = model, fluid.pairs, "FluidBesideWalls", beside, fluid.Params, fluid.params
+        self.loop = PairLoop.over(*given)
+        own = model.precision, self.loop.Data, self.loop.Params
+        self.density_term = images.density_term(fluid.weight, total, *own)
+        self.own_weight = images.own_weight(fluid.weight, total, *own)
+        pull, direction = fluid.pull(*own), DIRECTIONS[fluid.dimension]
+        self.force_term = images.force_term(pull, total, direction, moving, *own)
+        self.own_push = images.own_push(pull, total, moving, *own)
+
+    def look(self) -> None:
+        """Find how far the walls are from where particles are now."""
+        model, fluid, pairs = self.model, self.fluid, self.fluid.pairs
+        precision, device = model.precision, model.device
+        x, slack = pairs.fields["position"], self.easing.slack
+        v = x if self.rate is None else pairs.fields["velocity"]
+        seen = []
+        for wall, places, flags in zip(self.walls, self.places, self.flags, strict=True):
+            wall.follow()
+            surface = kernels.Surface(
+                wall.facing, places, self.total, precision, wall.Params, len(wall.pose) > 0,
+                fluid.dimension,
+            )  # fmt: skip
+            seen.append((surface, [pairs.pairs, wall.params, wall.pose, flags, x]))
+        marked = self.easing.marked
+        with when(self.easing.any_marked):
+            forget = kernels.forget_kernel()
+            launch(forget, len(slack), [marked, self.stride, slack], device)
+            for begin, (surface, inputs) in zip(self.begins, seen, strict=True):
+                own = [*inputs, marked, self.rest, begin, self.stride, slack]
+                launch(kernels.overlap_kernel(surface), pairs.count, own, device)
+        nowhere = kernels.nowhere_kernel(precision, self.total, fluid.Params)
+        launch(nowhere, pairs.count, [pairs.pairs, fluid.params, self.struct], device)
+        for begin, (surface, inputs) in zip(self.begins, seen, strict=True):
+            own = [*inputs, v, begin, self.stride, slack, self.struct]
+            launch(kernels.distance_kernel(surface), pairs.count, own, device)
+        near = kernels.near_kernel(precision, self.total, fluid.Params)
+        launch(near, pairs.rows, [pairs.pairs, fluid.params, self.struct], device)
+
+    def sum_density(self, plain: Pass, laws: tuple[Any, Any]) -> None:
+        """The pass of densities, of which ``plain`` is that far from walls."""
+        if not self:
+            plain.loop.sum(*plain[1:])
+            return
+        self.look()
+        store = functools.partial(keep_state, self.own_weight, *laws)
+        self._sum(plain, Pass(self.loop, self.density_term, store, plain.out))
+
+    def sum_force(self, plain: Pass) -> None:
+        """The pass of forces, of which ``plain`` is that far from walls."""
+        if not self:
+            plain.loop.sum(*plain[1:])
+            return
+        store = functools.partial(images.add_force, self.own_push, self.total)
+        out = {**plain.out, "normal": self.normal}
+        self._sum(plain, Pass(self.loop, self.force_term, store, out))
+
+    def pressed(self, part: Part) -> np.ndarray | None:
+        """What the fluid exerts on a boundary, (worlds, 3), at the last densities; None: nothing.
+
+        To each of several walls the part along its normal.
+        """
+        for (own, _), places in zip(self.held, self.places, strict=True):
+            if own.peers != part.peers:
+                continue
+            fluid, pairs = self.fluid, self.fluid.pairs
+            types = self.model.precision, self.loop.Data, self.loop.Params
+            term = images.press_term(fluid.pull(*types), self.total, self.rate is not None, *types)
+            store = functools.partial(
+                images.keep_press, self.own_push, min(places), max(places) + 1, self.total
+            )
+            pressed = pairs.array(self.model.precision.vec3)
+            self.loop.sum(term, store, {"pressed": pressed, "normal": self.normal})
+            force = pressed.numpy().astype(np.float64)
+            edges = zip(pairs.begin_host, pairs.end_host, strict=True)
+            return -np.stack([force[begin:end].sum(axis=0) for begin, end in edges])
+        return None
+
+    def _sum(self, plain: Pass, beside: Pass) -> None:
+        model, pairs, made = self.model, self.fluid.pairs, []
+        for loop, term, store, out in (plain, beside):
+            Out = structure_of("PairSums", out)
+            own = store(model.precision, loop.Data, loop.Params, Out)
+            made.append((term, own, loop.Data, Out))
+        kernel = images.walled_kernel(
+            *made, self.fluid.Params, model.precision, model.periodic, pairs.partners,
+            model.vectorised, self.total,
+        )  # fmt: skip
+        written = [filled(made[0][3], plain.out), filled(made[1][3], beside.out)]
+        inputs = [pairs.pairs, model.box, self.fluid.params, plain.loop.data, written[0]]
+        pairs.sum(kernel, [*inputs, self.struct, beside.loop.data, written[1]])
+
+
+def _held(model: Model, fluid: Any, part: ConstraintBase) -> np.ndarray:
+    """By particle, whether it is one of the fluid that a boundary holds, (n,) of 0 and 1."""
+    held = np.zeros(model.particle_count, dtype=np.int32)
+    for w, (peer, scene) in enumerate(zip(part.peers, model.scenes, strict=True)):
+        held[model.offsets[w] + select(scene, peer.group, part.name)] = 1
+    own = np.zeros_like(held)
+    own[fluid.pairs.members_host] = 1
+    return held * own
