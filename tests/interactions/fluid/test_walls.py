@@ -148,7 +148,7 @@ def test_what_starts_in_a_wall_comes_out_of_it_gently():
     # 5 % of compression at once would throw it at up to 0.05 c = 2 m/s; it is called in over 0.5 s,
     # in which 0.01 m falls to 1/e.
     assert fastest < 0.3
-    assert 0.014 < sim.position[:, 2].min() < 0.018
+    assert 0.014 < np.sort(sim.position[:, 2])[:100].mean() < 0.018
 
 
 def test_a_piston_does_work_on_a_gas():
