@@ -12,7 +12,7 @@ from .influence import finest
 
 DEAR = 5.5  # times as long as a wave at a particle does a near pair take (Fincham 1994)
 # Times as long as a near pair takes a particle at a node of the mesh, and the transforms at a node.
-AT_NODE, TRANSFORM = 1.0, 4.0
+AT_NODE, TRANSFORM = 1.5, 0.15
 ORDERS, CUTOFFS = range(4, HIGHEST + 1), 0.85 ** np.arange(24)  # tried; of half the box
 
 
