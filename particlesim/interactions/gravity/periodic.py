@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import warp as wp
@@ -13,6 +14,8 @@ from ...scene.law import law
 from ..electrostatics.images import Asked, Images
 from ..pair import Pair
 
+TWO_BY_ROOT_PI = 2.0 / math.sqrt(math.pi)
+
 
 @law
 def near_potential(
@@ -22,13 +25,24 @@ def near_potential(
     return -(constant * mass_i) * (mass_j * wp.erfc(damping * R) / R)
 
 
+@law
+def near_force(
+    r: float, mass_i: float, mass_j: float, constant: float, softening: float, damping: float
+):
+    # In an order that stays in single precision's range wherever the force does.
+    R2 = r * r + softening * softening
+    x = damping * wp.sqrt(R2)
+    part = wp.erfc(x) + TWO_BY_ROOT_PI * x * wp.exp(-x * x)
+    return -(constant * mass_i) * (mass_j / R2) * (r / wp.sqrt(R2)) * part
+
+
 class _Near(Pair):
     """What gravity has nearby, erfc(a R) / R of R^2 = r^2 + s^2."""
 
     name = "Gravity"
 
     def __init__(self, group: Any, cutoff: float, parameters: dict[str, Any]):
-        super().__init__(near_potential, None, group, cutoff, parameters)
+        super().__init__(near_potential, near_force, group, cutoff, parameters)
 
 
 class Periodic:
