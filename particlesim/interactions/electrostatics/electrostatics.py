@@ -34,28 +34,38 @@ class Electrostatics(Interaction):
     """u = k q_i q_j / r between the particles' attributes ``charge``, by a method of choice.
 
     ``"all_pairs"`` looks at all pairs of a world, in open space. ``"damped_shifted_force"`` ends
-    the force at a cutoff (Fennell and Gezelter 2006): see :class:`Coulomb`. ``"ewald"`` sums over
-    all periodic images (Ewald 1921): near pairs by erfc(a r) / r up to a cutoff, and waves, by the
-    kernels of ``nvalchemi-toolkit-ops`` (extra ``electrostatics``),
+    the force at a cutoff (Fennell and Gezelter 2006): see :class:`Coulomb`. Two sum over all
+    periodic images (Ewald 1921), near pairs by erfc(a r) / r up to a cutoff, and waves q:
 
         U = k sum_(i<j) q_i q_j erfc(a r) / r
             + 2 pi k / V sum_(q != 0) exp(-q^2 / 4 a^2) / q^2 |S(q)|^2 - k a / sqrt(pi) sum_i q_i^2
 
     of images that a conductor surrounds. Charges that do not add up to 0 are neutralised by a
-    uniform background. The waves' phases take 16 bytes a wave and particle: it is for thousands of
-    charges.
+    uniform background. ``"ewald"`` takes the waves one by one, by the kernels of
+    ``nvalchemi-toolkit-ops`` (extra ``electrostatics``), at N^(3/2) and 16 bytes a wave and
+    particle: for some hundred charges. Its forces sum to zero.
+
+    ``"particle_mesh_ewald"`` takes them by a mesh, at N log N: charges are put on it by B-splines
+    (Essmann et al. 1995), its influence function is the best for forces that are slopes of the
+    splines, and what a charge has with itself between the nodes is taken out (Ballenegger, Cerda
+    and Holm 2012). Spacing and order follow from the tolerance by the error that such a mesh
+    leaves (Hockney and Eastwood 1988). Forces keep the energy, and sum to zero within the
+    tolerance. The transform is NumPy's on the host, in double precision, of a CUDA device's mesh
+    too.
 
     Args:
-        method: One of these three.
+        method: One of these four.
         group: Which particles' charges; None: all.
         constant: k [energy length / charge^2].
-        cutoff: Of near pairs [length], for the last two; with ``"ewald"`` None: what costs least.
+        cutoff: Of near pairs [length], for all but the first; of the last two None: what costs
+            least, within half the box.
         damping: a [1/length], of ``"damped_shifted_force"``.
-        tolerance: Of ``"ewald"``: what both sums may leave out, in parts.
+        tolerance: Of the last two: what each part may leave out, in parts of q^2 / d^2, about the
+            force of neighbours.
         exclude: Pairs that do not feel each other, as of ``Pair``; their images do.
 
     Raises:
-        ValueError: An open axis with ``"ewald"``, a cutoff where none is taken or the reverse.
+        ValueError: An open axis with the last two, a cutoff where none is taken or the reverse.
         ImportError: ``"ewald"`` without the library.
 
     Example:
