@@ -56,6 +56,20 @@ def test_the_constants_of_madelung(kind, constant, method, device):
     assert np.abs(sim.get("force")).max() < (1e-11 if method == "ewald" else 3e-6)
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_the_crystal_of_wigner(method, device):
+    """Charges of one sign in a uniform background, bcc: U / N = -0.895929255682 q^2 / a (Foldy
+    1978), a the radius of a sphere of volume V / N. The background counts in full.
+    """
+    x = ps.sample.lattice("bcc", (3, 3, 3), 1.0)
+    scene = ps.Scene(periodic=((0, 0, 0), (3.0,) * 3))
+    scene.add_particles(x, charge=2.0)
+    scene.add_interaction(ps.Electrostatics(method))
+    a = (3.0 / (4.0 * math.pi * len(x) / 27.0)) ** (1.0 / 3.0)
+    found = simulate(scene, device).diagnostics().potential[0] / len(x)
+    assert found == pytest.approx(-0.895929255682 * 4.0 / a, rel=1e-6)
+
+
 @pytest.mark.parametrize("options", [{"tolerance": 1e-4}, {"tolerance": 1e-9, "cutoff": 2.5}])
 def test_forces_are_those_of_all_images(options, device):
     """To the tolerance, of the largest force; each part leaves out less than ten times as much."""
