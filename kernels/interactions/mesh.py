@@ -12,7 +12,6 @@ from typing import Any
 
 import warp as wp
 
-from ..engine.atomics import add_function
 from ..precision import Precision, function, register, structure
 
 HIGHEST = 8  # order of the splines
@@ -28,8 +27,8 @@ def mesh_type() -> Any:
             "inverse": wp.vec3d,  # of the spacing
             "nodes": wp.vec3i,
             "first": wp.int32,  # row of the first node
+            "column": wp.int32,  # number of the first column of nodes along z
             "order": wp.int32,  # of the splines
-            "scale": wp.float64,  # of charges, to whole numbers
         },
     )
 
@@ -68,8 +67,18 @@ def spline_functions() -> SimpleNamespace:
 
 
 @functools.cache
+def wrap_function() -> wp.Function:
+    """``wrapped(k, n)``: the node that one within a mesh beyond the first or the last is."""
+
+    def wrapped(k: int, nodes: int):
+        return wp.where(k < 0, k + nodes, wp.where(k >= nodes, k - nodes, k))
+
+    return function(wrapped)
+
+
+@functools.cache
 def _place_functions(precision: Precision) -> SimpleNamespace:
-    """``place(x, g)`` is it in spacings from the first node, within the box; ``wrapped(k, n)``."""
+    """``place(x, g)`` is it in spacings from the first node, within the box; and ``wrapped``."""
     vec3, Mesh = precision.vec3, mesh_type()
 
     def place(x: vec3, g: Mesh):
@@ -83,44 +92,100 @@ def _place_functions(precision: Precision) -> SimpleNamespace:
                 inside = 0
         return s, inside
 
-    def wrapped(k: int, nodes: int):
-        return wp.where(k < 0, k + nodes, wp.where(k >= nodes, k - nodes, k))
-
-    return SimpleNamespace(place=function(place), wrapped=function(wrapped))
+    return SimpleNamespace(place=function(place), wrapped=wrap_function())
 
 
 @functools.cache
-def put_kernel(precision: Precision) -> wp.Kernel:
-    """Kernel over particles: put their charges on the mesh.
+def column_kernels(precision: Precision) -> SimpleNamespace:
+    """Kernels that find which charges reach which columns of nodes along z, and with what shares.
 
-    They are added up in whole numbers, whose sum is the same in any order.
+    ``key``, over particles: the column that each stands in. ``begin``, over columns and one more:
+    the first slot of each, once particles are in the order of their keys. ``weigh``, over slots:
+    the shares of p nodes along each axis, the charge among those of x, and the last node along z.
     """
     vec3, real, Mesh = precision.vec3, precision.scalar, mesh_type()
-    of, rise, add = _place_functions(precision), spline_functions().rise, add_function()
+    of, rise = _place_functions(precision), spline_functions().rise
     place, wrapped = of.place, of.wrapped
 
     @register
-    def put_charges(
+    def find_columns(
         first: int, meshes: wp.array(dtype=Mesh), world: wp.array(dtype=wp.int32),
-        x: wp.array(dtype=vec3), charge: wp.array(dtype=real), sums: wp.array(dtype=wp.int64),
+        x: wp.array(dtype=vec3), charge: wp.array(dtype=real), outside: int,
+        key_out: wp.array(dtype=wp.int32), particle_out: wp.array(dtype=wp.int32),
     ):  # fmt: skip
         i = first + wp.tid()
         g = meshes[world[i]]
         s, inside = place(x[i], g)
+        key_out[i] = outside
+        particle_out[i] = i
         if inside != 0 and charge[i] != real(0.0):
-            q = wp.float64(charge[i]) * g.scale
-            k = wp.vec3i(int(wp.floor(s[0])), int(wp.floor(s[1])), int(wp.floor(s[2])))
-            wx = rise(s[0] - wp.float64(k[0]), g.order)
-            wy = rise(s[1] - wp.float64(k[1]), g.order)
-            wz = rise(s[2] - wp.float64(k[2]), g.order)
-            for a in range(g.order):
-                plane = g.first + wrapped(k[0] - a, g.nodes[0]) * g.nodes[1] * g.nodes[2]
-                for b in range(g.order):
-                    row = plane + wrapped(k[1] - b, g.nodes[1]) * g.nodes[2]
-                    share = q * wx[a] * wy[b]
+            along = wrapped(int(wp.floor(s[0])), g.nodes[0]) * g.nodes[1]
+            key_out[i] = g.column + along + wrapped(int(wp.floor(s[1])), g.nodes[1])
+
+    @register
+    def begin_columns(
+        first: int, count: int, key: wp.array(dtype=wp.int32), begin_out: wp.array(dtype=wp.int32)
+    ):
+        k = first + wp.tid()
+        low, high = int(0), int(count)
+        while low < high:
+            middle = (low + high) / 2
+            if key[middle] < k:
+                low = middle + 1
+            else:
+                high = middle
+        begin_out[k] = low
+
+    @register
+    def weigh_charges(
+        first: int, meshes: wp.array(dtype=Mesh), world: wp.array(dtype=wp.int32),
+        particle: wp.array(dtype=wp.int32), x: wp.array(dtype=vec3), charge: wp.array(dtype=real),
+        share_out: wp.array2d(dtype=wp.float64), last_out: wp.array(dtype=wp.int32),
+    ):  # fmt: skip
+        t = first + wp.tid()
+        i = particle[t]
+        g = meshes[world[i]]
+        s, inside = place(x[i], g)
+        if inside != 0:
+            for a in range(3):
+                w = rise(s[a] - wp.floor(s[a]), g.order)
+                q = wp.where(a == 0, wp.float64(charge[i]), wp.float64(1.0))
+                for j in range(g.order):
+                    share_out[t, a * HIGHEST + j] = q * w[j]
+            last_out[t] = int(wp.floor(s[2]))
+
+    return SimpleNamespace(key=find_columns, begin=begin_columns, weigh=weigh_charges)
+
+
+@functools.cache
+def put_kernel() -> wp.Kernel:
+    """Kernel over columns: what is put on each, added up in the order of the particles.
+
+    Nobody else writes there, so that sums are the same on any threads.
+    """
+    Mesh, wrapped = mesh_type(), wrap_function()
+
+    @register
+    def put_charges(
+        first: int, meshes: wp.array(dtype=Mesh), world: wp.array(dtype=wp.int32),
+        begin: wp.array(dtype=wp.int32), share: wp.array2d(dtype=wp.float64),
+        last: wp.array(dtype=wp.int32), sum_out: wp.array(dtype=wp.float64),
+    ):  # fmt: skip
+        k = first + wp.tid()
+        g = meshes[world[k]]
+        at = k - g.column
+        row = g.first + at * g.nodes[2]
+        for n in range(g.nodes[2]):
+            sum_out[row + n] = wp.float64(0.0)
+        for a in range(g.order):
+            along = wrapped(at / g.nodes[1] + a, g.nodes[0]) * g.nodes[1]
+            for b in range(g.order):
+                column = g.column + along + wrapped(at % g.nodes[1] + b, g.nodes[1])
+                for t in range(begin[column], begin[column + 1]):
+                    q = share[t, a] * share[t, HIGHEST + b]
                     for c in range(g.order):
-                        whole = wp.int64(wp.rint(share * wz[c]))
-                        add(row + wrapped(k[2] - c, g.nodes[2]), whole, sums)
+                        n = row + wrapped(last[t] - c, g.nodes[2])
+                        sum_out[n] = sum_out[n] + q * share[t, 2 * HIGHEST + c]
 
     return put_charges
 

@@ -79,12 +79,8 @@ class Images:
         self._constants(worlds)
         self.softened = worlds[0].softening is not None
         softening = np.array([each.softening or 0.0 for each in worlds])
-        given = owner, model, self.splittings, softening
-        self.smooth: Waves | Mesh = (
-            Waves(*given, self.total)
-            if method == "ewald"
-            else Mesh(*given, self.charge, self.total)
-        )
+        make = Waves if method == "ewald" else Mesh
+        self.smooth: Waves | Mesh = make(owner, model, self.splittings, softening, self.total)
 
     def _constants(self, worlds: Sequence[Asked]) -> None:
         """Of each world, its charges in units of about the largest, which no product rounds."""
@@ -96,7 +92,6 @@ class Images:
         unit = 2.0 ** np.round(np.log2(np.where(most > 0, most, 1.0)))
         member = np.zeros(count)
         member[self.rows] = 1.0 / unit[model.world_of[self.rows]]
-        self.charge = q * member
         self.member = model.array(member, real)
         self.taken = wp.zeros_like(self.member)
         self.world = model.array(model.world_of, wp.int32)
