@@ -15,6 +15,9 @@ import warp as wp
 from ..precision import Precision, function, register, structure
 
 HIGHEST = 8  # order of the splines
+# Nodes of a column that come once more before its first, so that those that a charge reaches are
+# next to each other, and always as many.
+BEFORE = HIGHEST - 1
 Weights = wp.types.vector(length=HIGHEST, dtype=wp.float64)
 
 
@@ -101,7 +104,8 @@ def column_kernels(precision: Precision) -> SimpleNamespace:
 
     ``key``, over particles: the column that each stands in. ``begin``, over columns and one more:
     the first slot of each, once particles are in the order of their keys. ``weigh``, over slots:
-    the shares of p nodes along each axis, the charge among those of x, and the last node along z.
+    the shares of p nodes along each axis, the charge among those of x and along z from the first
+    node on, with zeros before it; and the last node along z.
     """
     vec3, real, Mesh = precision.vec3, precision.scalar, mesh_type()
     of, rise = _place_functions(precision), spline_functions().rise
@@ -150,9 +154,9 @@ def column_kernels(precision: Precision) -> SimpleNamespace:
             for a in range(3):
                 w = rise(s[a] - wp.floor(s[a]), g.order)
                 q = wp.where(a == 0, wp.float64(charge[i]), wp.float64(1.0))
-                for j in range(g.order):
-                    share_out[t, a * HIGHEST + j] = q * w[j]
-            last_out[t] = int(wp.floor(s[2]))
+                for j in range(HIGHEST):
+                    share_out[t, wp.where(a == 2, 3 * HIGHEST - 1 - j, a * HIGHEST + j)] = q * w[j]
+            last_out[t] = wrapped(int(wp.floor(s[2])), g.nodes[2])
 
     return SimpleNamespace(key=find_columns, begin=begin_columns, weigh=weigh_charges)
 
@@ -174,8 +178,8 @@ def put_kernel() -> wp.Kernel:
         k = first + wp.tid()
         g = meshes[world[k]]
         at = k - g.column
-        row = g.first + at * g.nodes[2]
-        for n in range(g.nodes[2]):
+        row = g.first + at * (g.nodes[2] + BEFORE)
+        for n in range(g.nodes[2] + BEFORE):
             sum_out[row + n] = wp.float64(0.0)
         for a in range(g.order):
             along = wrapped(at / g.nodes[1] + a, g.nodes[0]) * g.nodes[1]
@@ -183,9 +187,12 @@ def put_kernel() -> wp.Kernel:
                 column = g.column + along + wrapped(at % g.nodes[1] + b, g.nodes[1])
                 for t in range(begin[column], begin[column + 1]):
                     q = share[t, a] * share[t, HIGHEST + b]
-                    for c in range(g.order):
-                        n = row + wrapped(last[t] - c, g.nodes[2])
-                        sum_out[n] = sum_out[n] + q * share[t, 2 * HIGHEST + c]
+                    n = row + last[t]
+                    for c in range(HIGHEST):
+                        sum_out[n + c] = sum_out[n + c] + q * share[t, 2 * HIGHEST + c]
+        for c in range(BEFORE):
+            n = row + c
+            sum_out[n + g.nodes[2]] = sum_out[n + g.nodes[2]] + sum_out[n]
 
     return put_charges
 
@@ -221,14 +228,15 @@ def feel_kernel(precision: Precision) -> wp.Kernel:
             dy = slope(rise(fy, p - 1), p)
             dz = slope(rise(fz, p - 1), p)
             for a in range(p):
-                plane = g.first + wrapped(k[0] - a, g.nodes[0]) * g.nodes[1] * g.nodes[2]
+                plane = wrapped(k[0] - a, g.nodes[0]) * g.nodes[1]
                 for b in range(p):
-                    row = plane + wrapped(k[1] - b, g.nodes[1]) * g.nodes[2]
+                    column = plane + wrapped(k[1] - b, g.nodes[1])
+                    n = g.first + column * (g.nodes[2] + BEFORE) + wrapped(k[2], g.nodes[2])
                     along, sloped = wp.float64(0.0), wp.float64(0.0)
-                    for c in range(p):
-                        u = potential[row + wrapped(k[2] - c, g.nodes[2])]
-                        along += u * wz[c]
-                        sloped += u * dz[c]
+                    for c in range(HIGHEST):
+                        u = potential[n + c]
+                        along += u * wz[HIGHEST - 1 - c]
+                        sloped += u * dz[HIGHEST - 1 - c]
                     total += wp.vec4d(
                         dx[a] * wy[b] * along, wx[a] * dy[b] * along, wx[a] * wy[b] * sloped,
                         wx[a] * wy[b] * along,

@@ -14,6 +14,7 @@ from ...engine.execution.launch import call, launch
 from ...engine.model import Model
 from ...engine.state import State
 from ...kernels.interactions.mesh import (
+    BEFORE,
     HIGHEST,
     column_kernels,
     feel_kernel,
@@ -46,7 +47,6 @@ class Mesh:
         self.owner, self.model, self.total = owner, model, total
         self.nodes = [each.nodes for each in splittings]
         box = model.box_length
-        self.first = np.concatenate([[0], np.cumsum([n.prod() for n in self.nodes])])
         self.weights: list[list[np.ndarray]] = []  # of energies, and of virials
         alone = np.zeros((2, model.world_count, 3))
         for w, each in enumerate(splittings):
@@ -57,6 +57,8 @@ class Mesh:
                            for one in self.weights[w]]  # fmt: skip
         self.alone = [model.array(each, wp.vec3d) for each in alone]
         sides = np.array(self.nodes)
+        self.stored = sides + np.array([0, 0, BEFORE])
+        self.first = np.concatenate([[0], np.cumsum(self.stored.prod(axis=1))])
         column = np.concatenate([[0], np.cumsum(sides[:, 0] * sides[:, 1])])
         columns = {
             "lower": model.box_lower, "inverse": sides / box, "nodes": sides,
@@ -110,12 +112,16 @@ class Mesh:
     def _solve(self, what: int) -> None:
         """The potential of what is on the mesh."""
         charges, total = self.charges.numpy(), np.zeros(len(self.nodes))
-        result = np.empty(len(charges))
+        result = np.empty_like(charges)
         for w, nodes in enumerate(self.nodes):
             rows = slice(int(self.first[w]), int(self.first[w + 1]))
-            waves = np.fft.rfftn(charges[rows].reshape(nodes))
+            rho = charges[rows].reshape(self.stored[w])[:, :, BEFORE:]
+            waves = np.fft.rfftn(rho)
             total[w] = waves[0, 0, 0].real / self.model.box_length[w].prod()
             waves *= self.weights[w][what] * nodes.prod()
-            result[rows] = np.fft.irfftn(waves, s=nodes.tolist(), axes=(0, 1, 2)).ravel()
+            u = np.fft.irfftn(waves, s=nodes.tolist(), axes=(0, 1, 2))
+            out = result[rows].reshape(self.stored[w])
+            out[:, :, BEFORE:] = u
+            out[:, :, :BEFORE] = u[:, :, np.arange(-BEFORE, 0) % nodes[2]]
         self.potential.assign(result)
         self.total.assign(total)

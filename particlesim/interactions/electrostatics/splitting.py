@@ -12,7 +12,7 @@ from .influence import finest
 
 DEAR = 0.15  # times as long as a wave at a particle a near pair takes
 # Times as long as a near pair takes a particle at a node of the mesh, and the transforms at a node.
-AT_NODE, TRANSFORM = 1.3, 0.5
+AT_NODE, TRANSFORM = 0.5, 0.5
 ORDERS, CUTOFFS = range(4, HIGHEST + 1), 0.85 ** np.arange(24)  # tried; of half the box
 
 
