@@ -105,7 +105,9 @@ def test_a_mesh_is_as_good_as_asked(box, tolerances, device):
         assert sim.diagnostics().potential[0] == pytest.approx(U, rel=tolerance)
 
 
-@pytest.mark.parametrize(("tolerance", "rounding"), [(1e-4, 0.0), (1e-6, 1e-6)])
+@pytest.mark.parametrize(
+    ("tolerance", "rounding"), [pytest.param(1e-4, 0.0, marks=pytest.mark.slow), (1e-6, 1e-6)]
+)
 def test_a_mesh_in_single_precision(tolerance, rounding, device):
     """Places at 8 are rounded by 2.4e-7 of a distance of 1, by which forces differ threefold."""
     scene = salt(method="particle_mesh_ewald", tolerance=tolerance)
@@ -197,6 +199,7 @@ def test_some_of_the_charges(method):
         simulate(scene, dt=1e-6, substeps=1).run(1)
 
 
+@pytest.mark.slow
 def test_charges_of_atoms_in_their_units():
     """In SI, where products of charges and of their fields leave single precision."""
     e, k, d = 1.602176634e-19, 8.9875517873681764e9, 2.8e-10

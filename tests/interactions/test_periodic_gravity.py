@@ -70,6 +70,7 @@ def test_softening_reaches_all_images(method, device):
     np.testing.assert_allclose(soft - sharp, less, rtol=0, atol=G * beyond)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_the_virial_is_how_energy_answers_to_the_scale(method):
     """-dU / d ln(scale) of box and places, by central differences of 1e-3: off by 1e-6 and by 1e-9

@@ -33,6 +33,7 @@ def test_it_is_the_complementary_error_function(name, device):
     assert y[-4:].tolist() == [0.0, 2.0, 0.0, 2.0]
 
 
+@pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
 def test_laws_call_it_and_derive_it(precision):
     """F = -du/dr of what near pairs of an Ewald sum have, to some ten roundings."""
 
