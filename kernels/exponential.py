@@ -57,16 +57,16 @@ def _value(
 """
 
 
-_SINGLE = _value("float", "unsigned", 23, 127, 7, (-86.6, 88.72283), 9)
-_DOUBLE = _value("double", "unsigned long long", 52, 1023, 13, (-707.7, 709.782712893384), 12)
+SINGLE = _value("float", "unsigned", 23, 127, 7, (-86.6, 88.72283), 9)
+DOUBLE = _value("double", "unsigned long long", 52, 1023, 13, (-707.7, 709.782712893384), 12)
 _RETURN, _DERIVE = "    return value;\n", "    adj_x += adj_ret * value;\n"
 
 
-@wp.func_native(_SINGLE + _RETURN, _SINGLE + _DERIVE)
+@wp.func_native(SINGLE + _RETURN, SINGLE + _DERIVE)
 def single(x: wp.float32) -> wp.float32: ...
 
 
-@wp.func_native(_DOUBLE + _RETURN, _DOUBLE + _DERIVE)
+@wp.func_native(DOUBLE + _RETURN, DOUBLE + _DERIVE)
 def double(x: wp.float64) -> wp.float64: ...
 
 

@@ -21,6 +21,7 @@ import numpy as np
 import warp as wp
 
 from .choices import derivable, passed, taken
+from .error_function import complement
 from .exponential import exponential
 from .extremes import larger, smaller, within
 from .warp_internals import compiled, digest, is_after_gradients, named_function
@@ -33,7 +34,9 @@ _DOUBLE = {
 _VECTORS = (*_DOUBLE.values(), *(getattr(wp, name) for name in _DOUBLE))
 _DOUBLE["float32"] = wp.float64
 # What laws call in place of Warp's own, so that they and their derivatives vectorise.
-_EXTREMES = {"max": larger, "min": smaller, "clamp": within, "exp": exponential}
+_EXTREMES = {
+    "max": larger, "min": smaller, "clamp": within, "exp": exponential, "erfc": complement,
+}  # fmt: skip
 _CHOICES = {"taken": taken, "passed": passed}
 
 

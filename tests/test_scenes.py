@@ -22,6 +22,7 @@ SMALL = {
     "phase_transition": {"cells": 4},
     "gas_in_a_box": {"count": 400},
     "polymer_melt": {"edge": 6},
+    "molten_salt": {"edge": 4, "tolerance": 1e-4},
 }
 
 
@@ -36,8 +37,8 @@ def simulate(name, frames, device, settings=None, **options):
 def test_the_ready_scenes_are_all_there():
     expected = (
         "bouncing_block chain dam_break freezing galaxy_collision gas_in_a_box lj_melt "
-        "phase_transition pile plummer_sphere polymer_melt spring_lattice star_collision "
-        "three_body triple_pendulum wave_field"
+        "molten_salt phase_transition pile plummer_sphere polymer_melt spring_lattice "
+        "star_collision three_body triple_pendulum wave_field"
     )
     assert set(expected.split()) <= set(NAMES)
 

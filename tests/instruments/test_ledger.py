@@ -16,6 +16,7 @@ SMALL = {
     "galaxy_collision": {"count": 300, "softening": 0.2},
     "freezing": {"cells": 5},
     "lj_melt": {"cells": 4},
+    "molten_salt": {"edge": 4, "tolerance": 1e-4},
     "phase_transition": {"cells": 4},
     "gas_in_a_box": {"count": 400},
     "pile": {"count": 100},

@@ -14,6 +14,7 @@ SMALL = {
     "star_collision": {"count": 150},
     "freezing": {"cells": 5},
     "lj_melt": {"cells": 4},
+    "molten_salt": {"edge": 4, "tolerance": 1e-4},
     "phase_transition": {"cells": 4},
     "gas_in_a_box": {"count": 400},
     "pile": {"count": 100},

@@ -167,7 +167,7 @@ def test_native_order_is_the_plain_one(device, monkeypatch):
         monkeypatch.setattr(Model, "vectorised", vectorised)
         sim = simulated([scene_of(each) for each in x], THETA, device, "float32")
         sim.forces(1.0)
-        orders.append(sim.interactions[0].tree.data.order.numpy())
+        orders.append(sim.interactions[0].sums.data.order.numpy())
     np.testing.assert_array_equal(*orders)
 
 

@@ -105,13 +105,14 @@ def few_forces(periodic, count):
 
 
 def charged():
-    """Kinds, pairs that are left out, an Ewald sum and fields."""
+    """Kinds, pairs that are left out, Ewald sums, by a mesh and softened, and fields."""
     scene = particles(periodic=BOX)
     more = scene.add_particles([(1, 1, 1)], group="more")
     kinds = [scene.groups[0], more]
     pairs = ps.LennardJones(kinds, sigma=[1.0, 0.8], truncation="xplor", exclude=[(0, 1)])
     scene.add_interaction(pairs)
-    scene.add_interaction(ps.Electrostatics("ewald", tolerance=1e-2))
+    scene.add_interaction(ps.Electrostatics("particle_mesh_ewald", tolerance=1e-2))
+    scene.add_interaction(ps.Gravity(softening=0.1, method="ewald", tolerance=1e-2))
     scene.add_interaction(ps.FieldForce(ps.GridField(*BOX, 1.0, speed=1.0)))
     scene.add_interaction(ps.FieldForce(ps.PoissonField(*BOX, 1.0), coupling="charge"))
     return scene

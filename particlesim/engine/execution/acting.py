@@ -49,6 +49,22 @@ def act(part: Any, function: Callable[..., None], *arguments: Any) -> None:
         program.acted.add(id(part))
 
 
+def on_host(owner: str, function: Callable[[], None], reason: str) -> None:
+    """Call ``function``, which works on the host, now or in its turn in every substep.
+
+    What its part launches besides is recorded, which :func:`act` cannot tell apart.
+
+    Args:
+        owner: Name of the part.
+        reason: What it does there, for ``explain``.
+    """
+    program = recording()
+    if program is None:
+        function()
+    else:
+        program.add(Host(function, owner, reason))
+
+
 def record_acts(actors: Sequence[Any], substep: Callable[[], None]) -> Program:
     """The program of a substep, in which ``actors`` act.
 

@@ -8,28 +8,25 @@ import numpy as np
 import warp as wp
 
 from ... import validate
-from ...engine.execution.launch import launch
 from ...engine.limit import Limit
 from ...engine.model import Model
 from ...engine.neighbors.lists import Neighbors
 from ...engine.probe import Probe
 from ...engine.state import State
-from ...kernels.interactions.charges import charge_kernels
-from ...scene.group import select
 from ...scene.law import law
 from ...scene.part import Interaction
 from ..bonded.bonds import Bonds
 from ..pair_limits import collisions
 from ..potentials.coulomb import Coulomb
-from .splitting import split
-from .waves import Waves
+from .images import METHODS as IMAGES
+from .images import Asked, Images
 
-METHODS = ("all_pairs", "damped_shifted_force", "ewald")
+METHODS = ("all_pairs", "damped_shifted_force", *IMAGES)
 
 
 @law
-def _of_waves(r: float, charge_i: float, charge_j: float, constant: float, damping: float):
-    """What waves have of a pair."""
+def _smooth(r: float, charge_i: float, charge_j: float, constant: float, damping: float):
+    """What the smooth part has of a pair."""
     return -(constant * charge_i) * charge_j * wp.erf(damping * r) / r
 
 
@@ -37,28 +34,38 @@ class Electrostatics(Interaction):
     """u = k q_i q_j / r between the particles' attributes ``charge``, by a method of choice.
 
     ``"all_pairs"`` looks at all pairs of a world, in open space. ``"damped_shifted_force"`` ends
-    the force at a cutoff (Fennell and Gezelter 2006): see :class:`Coulomb`. ``"ewald"`` sums over
-    all periodic images (Ewald 1921): near pairs by erfc(a r) / r up to a cutoff, and waves, by the
-    kernels of ``nvalchemi-toolkit-ops`` (extra ``electrostatics``),
+    the force at a cutoff (Fennell and Gezelter 2006): see :class:`Coulomb`. Two sum over all
+    periodic images (Ewald 1921), near pairs by erfc(a r) / r up to a cutoff, and waves q:
 
         U = k sum_(i<j) q_i q_j erfc(a r) / r
             + 2 pi k / V sum_(q != 0) exp(-q^2 / 4 a^2) / q^2 |S(q)|^2 - k a / sqrt(pi) sum_i q_i^2
 
     of images that a conductor surrounds. Charges that do not add up to 0 are neutralised by a
-    uniform background. The waves' phases take 16 bytes a wave and particle: it is for thousands of
-    charges.
+    uniform background. ``"ewald"`` takes the waves one by one, by the kernels of
+    ``nvalchemi-toolkit-ops`` (extra ``electrostatics``), at N^(3/2) and 16 bytes a wave and
+    particle: for some hundred charges. Its forces sum to zero.
+
+    ``"particle_mesh_ewald"`` takes them by a mesh, at N log N: charges are put on it by B-splines
+    (Essmann et al. 1995), its influence function is the best for forces that are slopes of the
+    splines, and what a charge has with itself between the nodes is taken out (Ballenegger, Cerda
+    and Holm 2012). Spacing and order follow from the tolerance by the error that such a mesh
+    leaves (Hockney and Eastwood 1988). Forces keep the energy, and sum to zero within the
+    tolerance. The transform is NumPy's on the host, in double precision, of a CUDA device's mesh
+    too.
 
     Args:
-        method: One of these three.
+        method: One of these four.
         group: Which particles' charges; None: all.
         constant: k [energy length / charge^2].
-        cutoff: Of near pairs [length], for the last two; with ``"ewald"`` None: what costs least.
+        cutoff: Of near pairs [length], for all but the first; of the last two None: what costs
+            least, within half the box.
         damping: a [1/length], of ``"damped_shifted_force"``.
-        tolerance: Of ``"ewald"``: what both sums may leave out, in parts.
+        tolerance: Of the last two: what each part may leave out, in parts of q^2 / d^2, about the
+            force of neighbours.
         exclude: Pairs that do not feel each other, as of ``Pair``; their images do.
 
     Raises:
-        ValueError: An open axis with ``"ewald"``, a cutoff where none is taken or the reverse.
+        ValueError: An open axis with the last two, a cutoff where none is taken or the reverse.
         ImportError: ``"ewald"`` without the library.
 
     Example:
@@ -81,7 +88,7 @@ class Electrostatics(Interaction):
         self.method = validate.choice(self.name, "method", method, METHODS)
         self.group, self.constant = group, validate.number(self.name, "constant", constant)
         self.tolerance = validate.number(self.name, "tolerance", tolerance, above=0.0, maximum=0.1)
-        if (method == "all_pairs") != (cutoff is None) and method != "ewald":
+        if (method == "all_pairs") != (cutoff is None) and method not in IMAGES:
             what = "be left out" if method == "all_pairs" else "be given [length]"
             raise validate.fail(
                 self.name, "cutoff", f"{what} with method={method!r}", cutoff, "choose another"
@@ -99,63 +106,41 @@ class Electrostatics(Interaction):
         return (type(self), self.method, *self.pairs.kind())
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
-        self.model, self.waves = model, list[Waves]()
+        self.model = model
+        self.images = self._images(model) if self.method in IMAGES else None
         pairs = [peer.pairs for peer in self.peers]
-        if self.method == "ewald":
-            pairs = self._split(model)
+        if self.images:
+            pairs = self._split(self.images)
         self.near = pairs[0].bind(pairs)
         self.near.prepare(model, neighbors)
-        if self.waves:
+        if self.images:
             self.left_out.prepare(model, neighbors)
 
-    def _split(self, model: Model) -> list[Coulomb]:
-        """Waves of every world, and its near pairs."""
-        parts, pairs, left_out = [], [], []
-        for w, peer in enumerate(self.peers):
-            parts.append(select(model.scenes[w], peer.group, self.name))
-            box = model.box_length[w]
-            found = split(np.where(box > 0, box, 1.0), len(parts[w]), peer.tolerance, peer.cutoff)
-            self.waves.append(Waves(self.name, model, w, found))
+    def _images(self, model: Model) -> Images:
+        asked = [Asked(p.group, p.constant, p.tolerance, p.cutoff) for p in self.peers]
+        return Images(self.name, model, self.method, "charge", asked)
+
+    def _split(self, images: Images) -> list[Coulomb]:
+        """Near pairs of every world; and what those that are excluded have in the smooth part."""
+        pairs, left_out = [], []
+        for peer, found in zip(self.peers, images.splittings, strict=True):
             given = peer.group, peer.constant, found.cutoff, found.damping
             pairs.append(Coulomb(*given, truncation="cut", exclude=peer.exclude))
             law_of = {"constant": peer.constant, "damping": found.damping}
-            left_out.append(Bonds(pairs[-1].chosen.excluded(), _of_waves, **law_of))
+            left_out.append(Bonds(pairs[-1].chosen.excluded(), _smooth, **law_of))
         self.left_out = left_out[0].bind(left_out)
-        member = np.zeros(model.particle_count)
-        member[np.concatenate([rows + model.offsets[w] for w, rows in enumerate(parts)])] = 1.0
-        precision, device = model.precision, model.device
-        self.member = model.array(member, precision.scalar)
-        self.taken = wp.zeros_like(self.member)
-        self.constants = model.array([peer.constant for peer in self.peers], precision.scalar)
-        self.world = model.array(model.world_of, wp.int32)
-        self.field = wp.zeros(model.particle_count, dtype=precision.vec3, device=device)
-        self.energies = [
-            wp.zeros(model.particle_count, dtype=wp.float64, device=device) for _ in range(2)
-        ]
         return pairs
 
     def attach(self, model: Model, state: State) -> None:
         self.near.attach(model, state)
-        if self.waves:
+        if self.images:
             self.left_out.attach(model, state)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         self.near.apply(state, neighbors, dt)
-        if self.waves:
-            self._waves(state)
-            inputs = [self.constants, self.world, self.field, state.force]
-            launch(self._kernels.force, len(self.taken), inputs, self.model.device)
+        if self.images:
+            self.images.apply(state)
             self.left_out.apply(state, neighbors, dt)
-
-    def _waves(self, state: State) -> None:
-        inputs = [state.charge, self.member, self.taken]
-        launch(self._kernels.take, len(self.taken), inputs, self.model.device)
-        for each in self.waves:
-            each.act(state, self.taken, self.energies[0], self.field)
-
-    @property
-    def _kernels(self) -> Any:
-        return charge_kernels(self.model.precision)
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the gradient at the present distances and, within a cutoff, at those to come."""
@@ -164,25 +149,24 @@ class Electrostatics(Interaction):
 
     def complaint(self) -> str:
         """That charges of a periodic box are not neutral; what pairs have to say."""
-        for w, each in enumerate(self.waves):
-            q = self.model.column("charge")[each.rows] * self.member.numpy()[each.rows]
-            if abs(q.sum()) > 1e-6 * np.abs(q).sum():
-                return (
-                    f"{self.name}: charges must add up to 0 in a periodic box, got {q.sum():.4g} "
-                    f"in world {w}, which a uniform background neutralises; add what is missing."
-                )
+        if self.images:
+            member = self.images.member.numpy() > 0
+            for w in range(self.model.world_count):
+                rows = self.model.rows(w)
+                q = self.model.column("charge")[rows] * member[rows]
+                if abs(q.sum()) > 1e-6 * np.abs(q).sum():
+                    return (
+                        f"{self.name}: charges must add up to 0 in a periodic box, got "
+                        f"{q.sum():.4g} in world {w}, which a uniform background neutralises; add "
+                        "what is missing."
+                    )
         return self.near.complaint()
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
-        if not self.waves:
+        if not self.images:
             self.near.measure(state, energy, virial)
             return
-        near, unused = (wp.zeros_like(energy) for _ in range(2))
+        own = wp.zeros_like(energy), wp.zeros_like(virial)
         for part in (self.near, self.left_out):
-            part.measure(state, near, unused)
-        self._waves(state)
-        raw, own = self.energies
-        for each in self.waves:
-            each.correct(self.taken, raw, own)
-        inputs = [self.constants, self.world, own, near, energy, virial]
-        launch(self._kernels.energy, len(self.taken), inputs, self.model.device)
+            part.measure(state, *own)
+        self.images.measure(state, own, energy, virial)

@@ -1,4 +1,4 @@
-"""How an Ewald sum is split between near pairs and waves."""
+"""How an Ewald sum is split between near pairs and waves, or near pairs and a mesh."""
 
 from __future__ import annotations
 
@@ -7,7 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-DEAR = 5.5  # times as long as a wave at a particle does a near pair take (Fincham 1994)
+from ...kernels.interactions.mesh import HIGHEST
+from .influence import finest
+
+DEAR = 0.15  # times as long as a wave at a particle a near pair takes
+# Times as long as a near pair takes a particle at a node of the mesh, and the transforms at a node.
+AT_NODE, TRANSFORM = 0.5, 0.5
+ORDERS, CUTOFFS = range(4, HIGHEST + 1), 0.85 ** np.arange(24)  # tried; of half the box
 
 
 @dataclass(frozen=True)
@@ -44,6 +50,50 @@ def split(box: np.ndarray, count: int, tolerance: float, cutoff: float | None) -
         cutoff = min(s / best, 0.5 * float(box.min()))
     damping = s / cutoff
     return Splitting(damping, cutoff, _half(box, 2.0 * damping * s))
+
+
+@dataclass(frozen=True)
+class MeshSplitting:
+    """A damping, and a mesh that leaves out what near pairs do (see ``influence``).
+
+    Args:
+        damping: a [1/length].
+        cutoff: Of near pairs [length].
+        nodes: Of the mesh along each axis, (3,).
+        order: Of the splines.
+    """
+
+    damping: float
+    cutoff: float
+    nodes: np.ndarray
+    order: int
+
+
+def split_mesh(
+    box: np.ndarray, count: int, tolerance: float, cutoff: float | None
+) -> MeshSplitting:
+    """The splitting for a box, by arguments as those of ``split``."""
+    s = math.sqrt(-math.log(tolerance))
+    tried = float(box.min()) * 0.5 * CUTOFFS if cutoff is None else [cutoff]
+    volume, found = float(np.prod(box)), []
+    for order in ORDERS:
+        for each in tried:
+            nodes = _smooth(np.maximum(box * s / each / finest(order, tolerance), order))
+            size = float(np.prod(nodes))
+            near = count * 4.0 / 3.0 * math.pi * each**3 / volume
+            cost = count * (near + AT_NODE * order**3) + TRANSFORM * size * math.log2(size)
+            found.append((cost, MeshSplitting(s / each, float(each), nodes, order)))
+    return min(found, key=lambda one: one[0])[1]
+
+
+def _smooth(least: np.ndarray) -> np.ndarray:
+    """The smallest numbers from these on that have no prime factor above 7."""
+    result = np.ceil(least - 1e-9).astype(int)
+    for a, n in enumerate(result):
+        while math.gcd(int(n), 210 ** int(n).bit_length()) != n:
+            n += 1
+        result[a] = n
+    return result
 
 
 def _half(box: np.ndarray, longest: float) -> np.ndarray:

@@ -19,7 +19,8 @@ class PoissonField(Field):
     Of ``FieldForce(field, coupling="mass")`` it makes gravity by a mesh (Hockney and Eastwood
     1981): of all images, of N particles and M nodes in N + M log M, and softened over about two
     spacings. The mean is left out, without which no periodic box has a potential. On the grid the
-    Laplacian is that of differences, of second order. The transform is NumPy's, on the host.
+    Laplacian is that of differences, of second order. The transform is NumPy's, on the host. Where
+    bodies are to feel each other as near as they come, :class:`Gravity` has methods of its own.
 
     Args:
         lower, upper: Corners of the box of ``Scene(periodic=...)``.

@@ -34,7 +34,10 @@ def _of_world(part: Any, peer: Any, probe: Probe, w: int, rows: np.ndarray) -> l
     G, s = peer.parameters["constant"], softenings(part, peer, probe, rows)
     m, x, v = probe.mass[rows], probe.position[rows], probe.velocity[rows]
     free = probe.inverse_mass[rows] > 0
+    length = probe.model.box_length[w]
+    images = np.divide(1.0, length, out=np.zeros(3), where=length > 0)
     x_ij = x[None] - x[:, None]
+    x_ij -= length * np.round(x_ij * images)
     r2 = (x_ij**2).sum(axis=2) + 0.5 * (s[None] ** 2 + s[:, None] ** 2)
     np.fill_diagonal(r2, np.inf)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -45,7 +48,7 @@ def _of_world(part: Any, peer: Any, probe: Probe, w: int, rows: np.ndarray) -> l
         acceleration = pull[:, :, None] * x_ij / np.sqrt(r2)[:, :, None]
         acceleration[~np.isfinite(acceleration)] = 0.0
         total = acceleration.sum(axis=1)
-        d, u, mu = x[i] - x[j], v[i] - v[j], G * (m[i] * free[j] + m[j] * free[i])
+        d, u, mu = x_ij[j, i], v[i] - v[j], G * (m[i] * free[j] + m[j] * free[i])
         r = np.linalg.norm(d, axis=1)
         own = acceleration[i, j] - acceleration[j, i]
         tide = (total[i] - total[j]) - own
@@ -92,11 +95,11 @@ def orbits(part: Any, probe: Probe) -> list[Limit]:
     (r^2 + s^2)^(3/2). The answer of the force to small changes, by which the sum over all pairs is
     judged, is not that of a tree: it jumps by the tree's error where a cell is opened.
     """
-    part.tree.build(probe.state)
+    part.sums.build(probe.state)
     found = []
     for w, peer in enumerate(part.peers):
         G = abs(peer.parameters["constant"])
-        rates = [part.tree.nodes(w), part.tree.couples(w)]
+        rates = [part.sums.nodes(w), part.sums.couples(w)]
         with np.errstate(all="ignore"):
             omega2 = np.concatenate([G * mass / square**1.5 for mass, square in rates])
         omega2 = omega2[np.isfinite(omega2)]

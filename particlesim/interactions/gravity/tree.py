@@ -39,7 +39,8 @@ class Tree:
     def __init__(
         self, model: Model, owner: str, members: np.ndarray, columns: Mapping[str, np.ndarray]
     ):
-        self.model, self.members, self.count = model, members, len(members)
+        self.model, self.owner = model, owner
+        self.members, self.count = members, len(members)
         self.own = "softening" not in columns
         precision, angle = model.precision, model.settings.opening_angle or 0.0
         closest = squared_distances(owner, model, None)["closest_squared"]
@@ -87,6 +88,14 @@ class Tree:
         self.group_count, self.worlds = len(group), world
         counts = np.bincount(level)
         return list(zip(np.cumsum(counts) - counts, counts, strict=True)), data
+
+    def attach(self, model: Model, state: State) -> None:
+        """Nothing to keep: the bodies are ordered anew each time."""
+
+    def complaint(self) -> str:
+        """That places are too coarse for how far the bodies are apart."""
+        lengths = self.model.apart()[1][self.model.world_of[self.members]]
+        return self.model.unresolved(self.owner, "spacing", lengths, self.members)
 
     def build(self, state: State) -> None:
         """Order the bodies as they are placed now, and sum up the moments of all nodes."""
