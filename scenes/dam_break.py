@@ -25,7 +25,6 @@ def build(
     spacing: float = 0.025,
     tank: float = 2.5,
     viscosity: float = 0.05,
-    seed: int = 0,
 ) -> ps.Scene:
     """Water in the left of a tank.
 
@@ -35,18 +34,12 @@ def build(
         spacing: Of the particles [m].
         tank: Length of the tank [m].
         viscosity: Artificial viscosity, alpha.
-        seed: Of the drops' radii.
     """
     height = 2 * width
     fastest = np.sqrt(2 * GRAVITY * height)
     scene = ps.Scene()
     column = ps.sample.box((0, 0, 0), (width, height, depth), spacing)
-    # Walls hold a drop at its radius: equal drops would lie there in one plane, whose pressure has
-    # no part across it, and stand on like a sheet of glass.
-    rough = np.random.default_rng(seed).uniform(0.6, 1.4, len(column))
-    water = scene.add_particles(
-        column, mass=1000.0 * spacing**3, radius=rough * spacing / 2, group="water"
-    )
+    water = scene.add_particles(column, mass=1000.0 * spacing**3, radius=spacing / 2, group="water")
     scene.add_interaction(ps.UniformGravity((0, -GRAVITY, 0)))
     scene.add_interaction(
         ps.SPH(
@@ -58,7 +51,7 @@ def build(
             viscosity=ps.ArtificialViscosity(viscosity),
         )
     )
-    scene.add_constraint(ps.BoxBoundary((0, 0, 0), (tank, 1.3 * height, depth)))
+    scene.add_constraint(ps.BoxBoundary((0, 0, 0), (tank, 1.3 * height, depth), slip=False))
     return scene
 
 

@@ -9,7 +9,12 @@ a fluid and of its images have an energy, whose gradient
     grad_i r'^2 / 2 = x_ij + 2 sum_a d_ja n_a
 
 is taken as it is, along the normals n_a where i is, also of a wall that is curved. What approaches
-does so at d(r'^2 / 2)/dt = v_ij . x_ij + 2 sum_a (d_ia' d_ja + d_ia d_ja').
+does so at v_ij' . x_ij'. Where the fluid slips, images have mirrored velocities, and that is
+d(r'^2 / 2)/dt = v_ij . x_ij + 2 sum_a (d_ia' d_ja + d_ia d_ja'). Where it sticks they have opposite
+ones (Morris et al. 1997), against the wall: s = -1 for an odd number of such reflections, else 1,
+
+    (v_i - s v_j) . x_ij
+        + 2 sum_slip (d_ia' d_ja + s d_ia d_ja') + 2 sum_stick d_ja (d_ia' - s d_ja')
 
 Clusters of slots that no wall is near to go by the plain terms.
 """
@@ -25,6 +30,8 @@ from ..engine.packed import FLAGS
 from ..precision import Precision, function, function_from_source, register
 from .pair import sums_over_partners
 from .walls import near_type
+
+Sticky = tuple[bool, ...] | None
 
 
 def sets(total: int) -> list[tuple[int, ...]]:
@@ -72,7 +79,7 @@ def own_weight(
 
 
 def force_term(
-    pull: wp.Function, total: int, direction: tuple[float, float, float], moving: bool,
+    pull: wp.Function, total: int, direction: tuple[float, float, float], sticky: Sticky,
     precision: Precision, data: Any, params: Any,
 ) -> Term:  # fmt: skip
     """Term (sum of w x_ij; of 2 d_ja w by place) over a pair and its images.
@@ -81,19 +88,20 @@ def force_term(
         pull: w(i, j, approach, r2, d, p) of one pair (see :mod:`.sph`).
         total: Places of walls.
         direction: Of coincident particles.
-        moving: The approach counts.
+        sticky: By place, whether the fluid sticks there; None: the approach does not count.
         precision: Of the simulation.
-        data: Struct with ``wall`` and, where the approach counts, ``v`` and ``rate``.
+        data: Struct with ``wall`` and, where the approach counts, ``v`` and ``rate``, and where it
+            sticks ``against``, velocities against walls.
         params: Struct of the fluid's parameters.
     """
     lines = [
         "apart = r2 > p.closest_squared",
         "side = wp.where(d.slot[i] < d.slot[j], -p.smoothing_length, p.smoothing_length)",
         "distance2 = wp.where(apart, r2, p.smoothing_length * p.smoothing_length)",
-        *_pair(total, moving),
+        *_pair(sticky),
         "g = pull(i, j, approach, distance2, d, p)",
         "aside = direction * wp.where(apart, real(0.0), side * g)",
-        *_pulls(total, moving, "j", "real(2.0) * D_j[{a}]", ["g += g{n}"]),
+        *_pulls(total, sticky, "j", "real(2.0) * D_j[{a}]", ["g += g{n}"]),
         "f = x_ij * g + aside",
     ]
     sums = ", ".join([*(f"f[{c}]" for c in range(3)), *(f"b{a}" for a in range(total))])
@@ -102,48 +110,61 @@ def force_term(
 
 
 def press_term(
-    pull: wp.Function, total: int, moving: bool, precision: Precision, data: Any, params: Any
+    pull: wp.Function, total: int, sticky: Sticky, precision: Precision, data: Any, params: Any
 ) -> Term:
     """Term of (d_ia + d_ja) w by place: what the images of a pair have along a wall's normal."""
-    lines = [*_pair(total, moving), *_pulls(total, moving, "j", "(D_i[{a}] + D_j[{a}])", [])]
+    lines = [*_pair(sticky), *_pulls(total, sticky, "j", "(D_i[{a}] + D_j[{a}])", [])]
     sums = ", ".join(f"b{a}" for a in range(total))
     return _term("press", lines, sums, total, total, {"pull": pull}, precision, data, params)
 
 
 @functools.cache
 def own_push(
-    pull: wp.Function, total: int, moving: bool, precision: Precision, data: Any, params: Any
+    pull: wp.Function, total: int, sticky: Sticky, precision: Precision, data: Any, params: Any
 ) -> wp.Function:
     """``own(i, d, p)``: of 2 d_ia w by place the sum over the images of a particle of itself."""
     lines = ["D_i = d.wall[i]", "D_j = D_i", "r2 = real(0.0)", "approach = real(0.0)"]
-    if moving:
-        lines += ["R_i = d.rate[i]", "R_j = R_i"]
-    lines += _pulls(total, moving, "i", "real(2.0) * D_i[{a}]", [])
+    if sticky is not None:
+        lines += ["R_i = d.rate[i]", "R_j = R_i", "meeting = approach"]
+    lines += _pulls(total, sticky, "i", "real(2.0) * D_i[{a}]", [])
     result = f"each({', '.join(f'b{a}' for a in range(total))})"
     names = {"pull": pull, "each": precision.vector(total)}
     header = "own(i: int, d: Data, p: Params)"
     return _function(header, lines, result, total, names, precision, data, params)
 
 
-def _pair(total: int, moving: bool) -> list[str]:
+def _pair(sticky: Sticky) -> list[str]:
     """Source of how far walls are from both particles, and of how fast these approach."""
     lines = ["D_i = read(d.wall, i)", "D_j = read(d.wall, j)"]
-    if not moving:
+    if sticky is None:
         return [*lines, "approach = real(0.0)"]
-    rates = ["R_i = read(d.rate, i)", "R_j = read(d.rate, j)"]
-    return [*lines, *rates, "approach = wp.dot(velocity(d.v, i) - velocity(d.v, j), x_ij)"]
+    lines += ["R_i = read(d.rate, i)", "R_j = read(d.rate, j)"]
+    lines += ["approach = wp.dot(velocity(d.v, i) - velocity(d.v, j), x_ij)"]
+    if any(sticky):
+        lines += ["meeting = wp.dot(velocity(d.against, i) + velocity(d.against, j), x_ij)"]
+    return lines
 
 
-def _pulls(total: int, moving: bool, j: str, arm: str, also: list[str]) -> list[str]:
+def _approach(each: tuple[int, ...], sticky: tuple[bool, ...]) -> str:
+    """Source of v_ij' . x_ij' of the image in these places."""
+    odd = sum(sticky[a] for a in each) % 2 == 1
+    plus, minus = ("-", "+") if odd else ("+", "-")
+    terms = ["meeting" if odd else "approach"]
+    for a in each:
+        slipping = f"(R_i[{a}] * D_j[{a}] {plus} D_i[{a}] * R_j[{a}])"
+        sticking = f"D_j[{a}] * (R_i[{a}] {minus} R_j[{a}])"
+        terms.append(f"real(2.0) * {sticking if sticky[a] else slipping}")
+    return " + ".join(terms)
+
+
+def _pulls(total: int, sticky: Sticky, j: str, arm: str, also: list[str]) -> list[str]:
     """Source of w of every image, which b of each of its places takes up along an ``arm``."""
     places = range(total)
     lines = [*_squares(total), *(f"b{a} = real(0.0)" for a in places)]
-    if moving:
-        lines += [f"u{a} = real(2.0) * (R_i[{a}] * D_j[{a}] + D_i[{a}] * R_j[{a}])" for a in places]
     for n, each in enumerate(sets(total)):
-        closing = "".join(f" + u{a}" for a in each) if moving else ""
+        closing = "approach" if sticky is None else _approach(each, sticky)
         square = "".join(f" + e{a}" for a in each)
-        lines.append(f"g{n} = pull(i, {j}, approach{closing}, r2{square}, d, p)")
+        lines.append(f"g{n} = pull(i, {j}, {closing}, r2{square}, d, p)")
         lines += [line.format(n=n) for line in also]
         lines += [f"b{a} += {arm.format(a=a)} * g{n}" for a in each]
     return lines

@@ -24,6 +24,7 @@ class Surface(NamedTuple):
         precision: Of the simulation.
         params: Struct of the surface's parameters.
         moving: It has poses.
+        sticky: The fluid sticks to it.
         dimension: Of the fluid: what closes a plane or a line in from its sides is no wall of it.
     """
 
@@ -33,6 +34,7 @@ class Surface(NamedTuple):
     precision: Precision
     params: Any
     moving: bool
+    sticky: bool
     dimension: int
 
 
@@ -48,6 +50,7 @@ def near_type(precision: Precision, total: int) -> Any:
     fields = {
         "distance": wp.array(dtype=each),
         "rate": wp.array(dtype=each),  # at which it grows; empty where nobody asks
+        "against": wp.array(dtype=precision.vec3),  # velocity to a wall that holds on; or empty
         "normal": wp.array(dtype=normals_of(precision, total)),
         "near": wp.array(dtype=wp.int32),
     }
@@ -58,10 +61,12 @@ def near_type(precision: Precision, total: int) -> Any:
 def nowhere_kernel(precision: Precision, total: int, fluid: Any) -> wp.Kernel:
     """Kernel: no wall is near."""
     each, normals, real = precision.vector(total), normals_of(precision, total), precision.scalar
-    Near = near_type(precision, total)
+    Near, vec3 = near_type(precision, total), precision.vec3
 
     @register
-    def no_wall(first: int, pairs: Pairs, fluids: wp.array(dtype=fluid), o: Near):
+    def no_wall(
+        first: int, pairs: Pairs, fluids: wp.array(dtype=fluid), v: wp.array(dtype=vec3), o: Near
+    ):  # fmt: skip
         i = first + wp.tid()
         far = real(FAR) * wp.sqrt(fluids[pairs.world[i]].cutoff_squared)
         d = each()
@@ -71,6 +76,8 @@ def nowhere_kernel(precision: Precision, total: int, fluid: Any) -> wp.Kernel:
         o.normal[i] = normals()
         if o.rate.shape[0] > 0:
             o.rate[i] = each()
+        if o.against.shape[0] > 0:
+            o.against[i] = v[i]
 
     return no_wall
 
@@ -81,7 +88,7 @@ def sight_function(surface: Surface) -> wp.Function:
 
     Those that are none of it are infinitely far.
     """
-    facing, places, _total, precision, params, moving, dimension = surface
+    facing, places, _total, precision, params, moving, _sticky, dimension = surface
     vec3, real, sides = precision.vec3, precision.scalar, len(places)
     each, normals = precision.vector(sides), normals_of(precision, sides)
     Pose, frame = pose_type(precision), frame_functions(precision)
@@ -112,7 +119,7 @@ def sight_function(surface: Surface) -> wp.Function:
 @functools.cache
 def distance_kernel(surface: Surface) -> wp.Kernel:
     """Kernel: how far the sides of a wall, moved by their slack, are from every slot it holds."""
-    _facing, places, total, precision, params, moving, _dimension = surface
+    _facing, places, total, precision, params, moving, sticky, _dimension = surface
     vec3, real, each = precision.vec3, precision.scalar, precision.vector(total)
     normals, Near, Pose = (
         normals_of(precision, total), near_type(precision, total), pose_type(precision),
@@ -158,6 +165,8 @@ def distance_kernel(surface: Surface) -> wp.Kernel:
                         if wp.static(moving):
                             u = u - velocity(x[i], pose[w])
                         rate[k] = wp.dot(u, n)
+                        if wp.static(sticky):
+                            o.against[i] = u
             o.distance[i] = own
             o.normal[i] = n_own
             if rated:
@@ -192,7 +201,7 @@ def overlap_kernel(surface: Surface) -> wp.Kernel:
     In worlds that are marked; ``rest`` is by world, ``slack`` by world and side from ``begin`` on.
     At most a side gives way by twice that.
     """
-    _facing, places, _total, precision, params, _moving, _dimension = surface
+    _facing, places, _total, precision, params, _moving, _sticky, _dimension = surface
     vec3, real, Pose = precision.vec3, precision.scalar, pose_type(precision)
     sides, rise, sight = len(places), rise_function(), sight_function(surface)
 

@@ -23,7 +23,17 @@ CELLS = 64  # along the longest side of what is drawn
 PLACES = 4096  # at which a law is asked for its period
 # Arguments of every boundary.
 OWN = frozenset(
-    {"law", "friction", "restitution", "group", "velocity", "angular_velocity", "pivot", "drawn"}
+    {
+        "law",
+        "friction",
+        "restitution",
+        "group",
+        "velocity",
+        "angular_velocity",
+        "pivot",
+        "drawn",
+        "slip",
+    }
 )
 
 
@@ -55,6 +65,7 @@ class Boundary(Holding):
         velocity: Of the boundary, (3,) [length/time].
         angular_velocity: About the pivot, (3,) [rad/time].
         pivot: What it turns about, as described, (3,) [length].
+        slip: A fluid slips along it; False: a viscous one sticks to it.
         drawn: ``(lower, upper)`` corners [length] of the box in which recordings draw the surface,
             as described; None: it is not drawn.
         **parameters: The law's further parameters: a number each, or (3,) where the law takes a
@@ -79,10 +90,10 @@ class Boundary(Holding):
     def __init__(
         self, law: Any, friction: float = 0.0, restitution: float = 0.0, group: Any = None, *,
         velocity: Sequence[float] = STILL, angular_velocity: Sequence[float] = STILL,
-        pivot: Sequence[float] = STILL,
+        pivot: Sequence[float] = STILL, slip: bool = True,
         drawn: tuple[Sequence[float], Sequence[float]] | None = None, **parameters: Any,
     ):  # fmt: skip
-        self._holds(friction, restitution, group, velocity, angular_velocity)
+        self._holds(friction, restitution, group, velocity, angular_velocity, slip)
         self.pivot = validate.vector(self.name, "pivot", pivot, unit="length")
         self.law = make_law(law)
         self.law.check_derivable(self.name)
@@ -91,10 +102,10 @@ class Boundary(Holding):
 
     def _holds(
         self, friction: float, restitution: float, group: Any, velocity: Sequence[float],
-        angular_velocity: Sequence[float],
+        angular_velocity: Sequence[float], slip: bool,
     ) -> None:  # fmt: skip
         """What boundaries of every surface are made with."""
-        self.group = group
+        self.group, self.slip = group, bool(slip)
         self.friction = validate.number(self.name, "friction", friction, minimum=0.0)
         self.restitution = validate.number(
             self.name, "restitution", restitution, minimum=0.0, maximum=1.0
@@ -138,7 +149,7 @@ class Boundary(Holding):
 
     def kind(self) -> tuple[Any, ...]:
         given = (self.law.key, tuple(self.parameters)) if "law" in vars(self) else ()
-        return (type(self), *given)
+        return (type(self), self.slip, *given)
 
     def distance(self, points: Any) -> np.ndarray:
         """The law at points (n, 3) [length] of the boundary as described, that is at time 0.

@@ -37,6 +37,7 @@ class PlaneBoundary(Boundary):
         velocity: Of the plane, (3,) [length/time]: along the normal a piston, across it a
             conveyor belt, which stays where it is.
         angular_velocity: About the point, (3,) [rad/time]: along the normal a turntable.
+        slip: A fluid slips along it; False: a viscous one sticks to it.
 
     Raises:
         ValueError: Values out of range; a normal along a periodic axis.
@@ -55,9 +56,9 @@ class PlaneBoundary(Boundary):
     def __init__(
         self, point: Sequence[float], normal: Sequence[float], friction: float = 0.0,
         restitution: float = 0.0, group: Any = None, *, velocity: Sequence[float] = STILL,
-        angular_velocity: Sequence[float] = STILL,
+        angular_velocity: Sequence[float] = STILL, slip: bool = True,
     ):  # fmt: skip
-        self._holds(friction, restitution, group, velocity, angular_velocity)
+        self._holds(friction, restitution, group, velocity, angular_velocity, slip)
         self.point = validate.vector(self.name, "point", point, unit="length")
         given = validate.vector(self.name, "normal", normal)
         longest = np.abs(given).max()
@@ -117,6 +118,7 @@ class BoxBoundary(Boundary):
         group: Which particles it holds; None: all.
         velocity: Of the box, (3,) [length/time].
         angular_velocity: About its middle, (3,) [rad/time]; only of a box without open sides.
+        slip: A fluid slips along it; False: a viscous one sticks to it.
 
     Raises:
         ValueError: Values out of range; a side on a periodic axis; an open box that turns.
@@ -137,9 +139,9 @@ class BoxBoundary(Boundary):
     def __init__(
         self, lower: Sequence[float], upper: Sequence[float], friction: float = 0.0,
         restitution: float = 0.0, group: Any = None, *, velocity: Sequence[float] = STILL,
-        angular_velocity: Sequence[float] = STILL,
+        angular_velocity: Sequence[float] = STILL, slip: bool = True,
     ):  # fmt: skip
-        self._holds(friction, restitution, group, velocity, angular_velocity)
+        self._holds(friction, restitution, group, velocity, angular_velocity, slip)
         self.lower = self._corner("lower", lower, -np.inf)
         self.upper = self._corner("upper", upper, np.inf)
         if not (self.lower < self.upper).all():
@@ -218,6 +220,7 @@ class SphereBoundary(Boundary):
         group: Which particles it holds; None: all.
         velocity: Of the sphere, (3,) [length/time].
         angular_velocity: About the center, (3,) [rad/time].
+        slip: A fluid slips along it; False: a viscous one sticks to it.
 
     Raises:
         ValueError: Values out of range; a periodic scene.
@@ -234,9 +237,9 @@ class SphereBoundary(Boundary):
     def __init__(
         self, center: Sequence[float], radius: float, inside: bool = True, friction: float = 0.0,
         restitution: float = 0.0, group: Any = None, *, velocity: Sequence[float] = STILL,
-        angular_velocity: Sequence[float] = STILL,
+        angular_velocity: Sequence[float] = STILL, slip: bool = True,
     ):  # fmt: skip
-        self._holds(friction, restitution, group, velocity, angular_velocity)
+        self._holds(friction, restitution, group, velocity, angular_velocity, slip)
         self.center = validate.vector(self.name, "center", center, unit="length")
         self.radius = validate.number(self.name, "radius", radius, above=0.0, unit="length")
         self.inside = bool(inside)

@@ -29,6 +29,7 @@ class Holding(EasedConstraint):
     requires = frozenset({"position", "velocity", "inverse_mass", "radius", "correction"})
     solid = True
     sides = 1  # at most how many of them a particle touches at once
+    slip: bool
     places: tuple[int, ...] = (0,)  # see Wall
 
     def surface(self, precision: Precision) -> wp.Function:
@@ -80,10 +81,9 @@ class Holding(EasedConstraint):
             if moving:
                 launch(pose_kernel(precision), count, [motion, state.time, pose], model.device)
 
-        return Wall(
-            self.name, self.peers, self.places, self.facing(precision, Params), Params, params,
-            pose, follow,
-        )  # fmt: skip
+        facing = self.facing(precision, Params)
+        own = self.name, self.peers, self.places, not self.slip
+        return Wall(*own, facing, Params, params, pose, follow)
 
     def attach(self, model: Model, state: State) -> None:
         if not self.count:

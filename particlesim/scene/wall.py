@@ -16,6 +16,7 @@ class Wall:
         peers: The boundary in the scene of every world.
         places: Of each side which place among those of the boundary it takes: a particle sees the
             nearest of those that share one.
+        sticky: A viscous fluid sticks to it.
         facing: Warp function ``(x, p) -> (d, N)``: of the place x, as the boundary is described,
             the signed distances of the sides, positive in front of them, and the unit normals,
             (sides, 3), to there.
@@ -28,6 +29,7 @@ class Wall:
     name: str
     peers: Sequence[Any]
     places: Sequence[int]
+    sticky: bool
     facing: Any
     Params: Any
     params: Any

@@ -120,7 +120,7 @@ class Reading(Access):
             Of a constraint on tuples the estimate on the end that feels most, |lam| |grad C| /
             dt^2, (m,), in the order of its tuples; world by world where it stands for several. Of a
             boundary what particles exert on it, (3,), or (worlds, 3) where it stands for several:
-            those that touch it, and fluids, which also press on it from some way off.
+            those that touch it, and the pressure of fluids, without what one that sticks to it drags.
 
         Raises:
             ValueError: It is no part of this simulation, or neither of these.

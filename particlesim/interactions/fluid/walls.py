@@ -83,6 +83,12 @@ class Walls:
         self.struct = kernels.near_type(precision, self.total)()
         self.struct.distance = self.distance
         self.struct.rate = none if self.rate is None else self.rate
+        sticks = [wall.sticky and moving for wall in self.walls]
+        vec3, count = precision.vec3, pairs.count if any(sticks) else 0
+        self.against = pairs.array(vec3) if count else wp.empty(0, dtype=vec3, device=model.device)
+        self.struct.against = self.against
+        holds = {k for on, places in zip(sticks, self.places, strict=True) if on for k in places}
+        self.sticky = tuple(k in holds for k in range(self.total)) if moving else None
         self.normal = pairs.array(kernels.normals_of(precision, self.total))
         self.struct.normal = self.normal
         self.struct.near = wp.zeros(pairs.rows, dtype=wp.int32, device=model.device)
@@ -91,7 +97,7 @@ class Walls:
         self.stride, self.begins = sum(sides), np.cumsum([0, *sides])[:-1].tolist()
         self.easing = Easing(model, model.world_count * self.stride, wp.float32, ends=1)
         self.rest = model.array(0.5 * self.fluid.spacings, precision.scalar)
-        self._make_terms(fields, moving)
+        self._make_terms(fields)
 
     def ease(self, dt: float) -> None:
         """The slack of the start runs out."""
@@ -108,18 +114,21 @@ class Walls:
         every = np.arange(self.model.world_count)
         return np.repeat(every, self.stride) if name == "slack" else None
 
-    def _make_terms(self, fields: Mapping[str, wp.array], moving: bool) -> None:
+    def _make_terms(self, fields: Mapping[str, wp.array]) -> None:
         model, fluid, total = self.model, self.fluid, self.total
-        rate = {} if self.rate is None else {"rate": self.rate}
-        beside = {**fields, "wall": self.distance, **rate}
+        beside = {**fields, "wall": self.distance}
+        if self.rate is not None:
+            beside["rate"] = self.rate
+        if len(self.against):
+            beside["against"] = self.against
         given = model, fluid.pairs, "FluidBesideWalls", beside, fluid.Params, fluid.params
         self.loop = PairLoop.over(*given)
         own = model.precision, self.loop.Data, self.loop.Params
         self.density_term = images.density_term(fluid.weight, total, *own)
         self.own_weight = images.own_weight(fluid.weight, total, *own)
         pull, direction = fluid.pull(*own), DIRECTIONS[fluid.dimension]
-        self.force_term = images.force_term(pull, total, direction, moving, *own)
-        self.own_push = images.own_push(pull, total, moving, *own)
+        self.force_term = images.force_term(pull, total, direction, self.sticky, *own)
+        self.own_push = images.own_push(pull, total, self.sticky, *own)
 
     def look(self) -> None:
         """Find how far the walls are from where particles are now."""
@@ -132,7 +141,7 @@ class Walls:
             wall.follow()
             surface = kernels.Surface(
                 wall.facing, places, self.total, precision, wall.Params, len(wall.pose) > 0,
-                fluid.dimension,
+                wall.sticky and len(self.against) > 0, fluid.dimension,
             )  # fmt: skip
             seen.append((surface, [pairs.pairs, wall.params, wall.pose, flags, x]))
         marked = self.easing.marked
@@ -143,7 +152,7 @@ class Walls:
                 own = [*inputs, marked, self.rest, begin, self.stride, slack]
                 launch(kernels.overlap_kernel(surface), pairs.count, own, device)
         nowhere = kernels.nowhere_kernel(precision, self.total, fluid.Params)
-        launch(nowhere, pairs.count, [pairs.pairs, fluid.params, self.struct], device)
+        launch(nowhere, pairs.count, [pairs.pairs, fluid.params, v, self.struct], device)
         for begin, (surface, inputs) in zip(self.begins, seen, strict=True):
             own = [*inputs, v, begin, self.stride, slack, self.struct]
             launch(kernels.distance_kernel(surface), pairs.count, own, device)
@@ -178,7 +187,7 @@ class Walls:
                 continue
             fluid, pairs = self.fluid, self.fluid.pairs
             types = self.model.precision, self.loop.Data, self.loop.Params
-            term = images.press_term(fluid.pull(*types), self.total, self.rate is not None, *types)
+            term = images.press_term(fluid.pull(*types), self.total, self.sticky, *types)
             store = functools.partial(
                 images.keep_press, self.own_push, min(places), max(places) + 1, self.total
             )
