@@ -57,10 +57,11 @@ from .pictures.render.camera import Camera
 from .scene import __version__, sample
 from .scene.group import Group
 from .scene.law import Law, law
-from .scene.part import ConstraintBase, Interaction, Thermostat
+from .scene.part import ConstraintBase, Interaction
 from .scene.scene import Scene
 from .scene.settings import Settings
 from .scene.table import Table
+from .scene.thermostat import Thermostat
 from .simulation.simulation import Simulation
 
 __all__ = [

@@ -12,9 +12,10 @@ import warp as wp
 
 from .. import validate
 from ..scene.fingerprint import laws_of
-from ..scene.part import ConstraintBase, Interaction, Part, Thermostat
+from ..scene.part import ConstraintBase, Interaction, Part
 from ..scene.scene import Scene
 from ..scene.settings import Settings
+from ..scene.thermostat import Thermostat
 from .execution.acting import act
 from .execution.launch import owner
 from .integrators import Integrator, method

@@ -187,6 +187,14 @@ class Interaction(Part):
     def measure(self, state: Any, energy: Any, virial: Any) -> None:
         """Add the potential energy and the virial of each particle (float64), on demand."""
 
+    def measure_stress(self, state: Any, energy: Any, stress: Any) -> bool:
+        """The same with the virial as a tensor, r_a F_b made symmetric: xx, yy, zz, yz, xz, xy.
+
+        Returns:
+            Whether it is known, and was added; if not, ``measure`` tells at least its trace.
+        """
+        return False
+
     def limits(self, probe: Any) -> list[Any]:
         """Bounds on the substep at the present state (see ``Simulation.stability``).
 
@@ -202,24 +210,6 @@ class Interaction(Part):
             name: np.array(row, np.int32 if isinstance(row[0], np.integer) else np.float64)
             for name, row in rows.items()
         }
-
-
-class Thermostat(Part):
-    """A heat bath: it changes velocities in the middle of every drift, in turn with the others.
-
-    What ``exchange`` may do is what ``apply`` of an :class:`Interaction` may. It is called by
-    ``Integrator.drift`` and ``move``; a method of which stages go back in time takes none.
-    """
-
-    requires: frozenset[str] = frozenset({"velocity"})
-
-    def exchange(self, state: Any, dt: float) -> None:
-        """Change velocities as the bath does in ``dt``."""
-        raise validate.undefined(self, "exchange(self, state, dt)")
-
-    def fastest(self, scene: Any) -> float:
-        """What a component of a velocity that it gives is about, at most [length/time]."""
-        return 0.0
 
 
 class ConstraintBase(Part):
@@ -271,6 +261,10 @@ class ConstraintBase(Part):
 
     def measure(self, state: Any, energy: Any, virial: Any) -> None:
         """Add the virial of each particle (float64) in the last substep, on demand."""
+
+    def measure_stress(self, state: Any, energy: Any, stress: Any) -> bool:
+        """The same as a tensor, as of :class:`Interaction`; False: it is not known."""
+        return False
 
     def read_force(self, part: Part) -> np.ndarray:
         """See ``Simulation.force``; ``part`` is this, or the one of some worlds' scenes."""

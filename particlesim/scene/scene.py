@@ -11,7 +11,8 @@ import numpy as np
 from .. import validate
 from .bounds import corners, periodic_box
 from .group import PALETTE, Color, Group
-from .part import ConstraintBase, Interaction, Thermostat
+from .part import ConstraintBase, Interaction
+from .thermostat import Thermostat
 
 # Names of the engine's own per-particle arrays, which attributes of a scene cannot take.
 RESERVED = frozenset(

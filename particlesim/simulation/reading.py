@@ -27,9 +27,10 @@ from ..interactions.fluid.sph import SPH
 from ..output import checkpoint
 from ..pictures.render.camera import Camera
 from ..pictures.render.image import Image
-from ..scene.part import ConstraintBase, Interaction, Thermostat
+from ..scene.part import ConstraintBase, Interaction
 from ..scene.scene import Scene
 from ..scene.settings import Settings
+from ..scene.thermostat import Thermostat
 from .access import Access, World, Writer
 
 

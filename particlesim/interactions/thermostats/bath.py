@@ -14,8 +14,8 @@ from ...engine.neighbors.lists import Neighbors
 from ...engine.state import State
 from ...kernels.interactions import thermostat as kernels
 from ...scene.group import select
-from ...scene.part import Thermostat
 from ...scene.scene import Scene
+from ...scene.thermostat import Thermostat
 
 
 class Bath(Thermostat):
