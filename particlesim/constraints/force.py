@@ -36,6 +36,7 @@ class ConstraintForce(Interaction):
     """
 
     requires = frozenset({"force"})
+    follows_box = True
     reads_velocity = True  # whatever the damping of a world is: worlds go as they go alone
 
     def __init__(self, constraint: Any):

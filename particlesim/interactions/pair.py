@@ -58,6 +58,7 @@ class Pair(Interaction):
         switch: In parts of the cutoff.
     """
 
+    follows_box = True
     listed = True  # sums over a list of pairs, in one pass with others that share it
 
     def __init__(

@@ -79,6 +79,10 @@ class Part:
         """What is to be said of the start, once a run begins; empty where it fits."""
         return ""
 
+    def fault(self, world: int) -> str:
+        """Why it has made the numbers of a world no numbers; empty where it has not."""
+        return ""
+
     def persistent(self) -> dict[str, Any]:
         """Arrays that outlive a substep, for snapshots and checkpoints."""
         return {}
@@ -158,6 +162,8 @@ class Interaction(Part):
     cutoff: float | None = None
     reads_velocity: bool | None = None  # in any other way than that of ``follow``
     conservative: bool = False  # `measure` adds the potential of all that it does
+    # It is right in ``model.box`` as it is at present, also for ``measure`` (see ``Barostat``).
+    follows_box: bool = False
     # Adds its force to ``implicit_force`` too, where that is kept, df/dv to ``force_slope``, and
     # has ``follow``.
     implicit: bool = False

@@ -1,11 +1,12 @@
-"""Thermostats, as abstract parts of a scene."""
+"""Thermostats and barostats, as abstract parts of a scene."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from .. import validate
-from .part import Part
+from .part import Interaction, Part
 
 
 class Thermostat(Part):
@@ -24,3 +25,16 @@ class Thermostat(Part):
     def fastest(self, scene: Any) -> float:
         """What a component of a velocity that it gives is about, at most [length/time]."""
         return 0.0
+
+
+class Barostat(Thermostat):
+    """It changes the box, and with it positions and velocities, where a thermostat acts.
+
+    The box is ``state.box``, one row a world: its lower corner, which stays, its lengths, and one
+    over these. ``interactions`` are those of the simulation, which tell their virial by
+    ``measure``. There is one in a scene, of which all axes are periodic, nothing is pinned, and
+    all parts follow the box.
+    """
+
+    requires: frozenset[str] = frozenset({"position", "velocity", "box"})
+    interactions: Sequence[Interaction]  # once bound

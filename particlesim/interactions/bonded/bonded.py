@@ -49,6 +49,7 @@ class Bonded(Interaction):
     coordinate: Callable[[Precision], wp.Function]  # that a law takes first
     # Others, by what it calls them.
     by_name: Mapping[str, Callable[[Precision], wp.Function]] = MappingProxyType({})
+    follows_box = True
     damped = False  # with -damping dq/dt beside -du/dq; ``items`` gives the damping
 
     def __init__(self, law: Any, tuples: Any, parameters: Mapping[str, Any]):

@@ -67,6 +67,11 @@ def pressure(record: Record) -> Panel:
     return Panel("pressure", "energy / length³", _family(record, "pressure"))
 
 
+def volume(record: Record) -> Panel:
+    """Of a box that a barostat scales."""
+    return Panel("volume", "length³", _family(record, "volume"))
+
+
 def stress(record: Record) -> Panel:
     """Of a periodic box, as a pressure."""
     return Panel("stress", "energy / length³", _family(record, "stress_"))
@@ -94,7 +99,7 @@ PANELS: dict[str, Callable[[Record], Panel]] = {
     each.__name__: each
     for each in (
         energy, drift, momentum, angular_momentum, potential, temperature, pressure, stress,
-        density, residual, observed,
+        volume, density, residual, observed,
     )
 }  # fmt: skip
 

@@ -29,6 +29,7 @@ def sample(sim: Source, observe: Observed | None = None) -> dict[str, np.ndarray
         names = ["kinetic", "potential", "energy", "temperature"]
         boxed = bool(np.isfinite(total.volume).all())
         names += ["pressure"] if boxed else []
+        names += ["volume"] if sim.model.flexible else []
         values |= {name: getattr(total, name) for name in names}
         for a, b in AXES if boxed else ():
             values[f"stress_{'xyz'[a]}{'xyz'[b]}"] = total.stress[:, a, b]
