@@ -48,6 +48,7 @@ from .interactions.potentials.mie import LennardJones, Mie
 from .interactions.potentials.morse import Morse
 from .interactions.potentials.soft_sphere import SoftSphere
 from .interactions.potentials.yukawa import Yukawa
+from .interactions.thermostats.cell_rescaling import CellRescaling
 from .interactions.thermostats.langevin import Langevin
 from .interactions.thermostats.velocity_rescaling import VelocityRescaling
 from .output.history.writer import History, read_history
@@ -57,20 +58,23 @@ from .pictures.render.camera import Camera
 from .scene import __version__, sample
 from .scene.group import Group
 from .scene.law import Law, law
-from .scene.part import ConstraintBase, Interaction, Thermostat
+from .scene.part import ConstraintBase, Interaction
 from .scene.scene import Scene
 from .scene.settings import Settings
 from .scene.table import Table
+from .scene.thermostat import Barostat, Thermostat
 from .simulation.simulation import Simulation
 
 __all__ = [
     "SPH",
     "Angles",
     "ArtificialViscosity",
+    "Barostat",
     "Bonds",
     "Boundary",
     "BoxBoundary",
     "Camera",
+    "CellRescaling",
     "ConstantForce",
     "Constraint",
     "ConstraintBase",

@@ -5,6 +5,7 @@ import functools
 import warp as wp
 
 from ..precision import function, register
+from ..tensor import Tensor, virial_function, virial_type
 from .constraints import Solved, view_function
 
 
@@ -59,10 +60,14 @@ def force_kernel(law: Solved) -> wp.Kernel:
 
 
 @functools.cache
-def measure_kernel(law: Solved) -> wp.Kernel:
-    """Kernel: energy C^2 / (2 alpha) and virial, to each of a tuple's particles its share."""
+def measure_kernel(law: Solved, tensor: bool) -> wp.Kernel:
+    """Kernel: energy C^2 / (2 alpha) and virial, to each of a tuple's particles its share.
+
+    ``tensor``: the virial as a tensor.
+    """
     real, Box, Tuples, Bodies = law.types
     size, view, one_sided = law.size, view_function(law), law.one_sided
+    kind, virial = virial_type(tensor), virial_function(law.precision, tensor)
 
     @register
     def constraint_measure(
@@ -72,7 +77,7 @@ def measure_kernel(law: Solved) -> wp.Kernel:
         t: Tuples,
         b: Bodies,
         energy_io: wp.array(dtype=wp.float64),
-        virial_io: wp.array(dtype=wp.float64),
+        virial_io: wp.array(dtype=kind),
     ):
         k = first + wp.tid()
         i = seats.particle[k]
@@ -83,11 +88,11 @@ def measure_kernel(law: Solved) -> wp.Kernel:
             pull = C / t.item[r].compliance
             if wp.static(one_sided):
                 pull = wp.where(C >= real(0.0), real(0.0), pull)
-            w = -wp.float64(pull) * wp.float64(wp.dot(G[a], X[a] - X[0]))
-            if wp.isfinite(w):
+            d = X[a] - X[0]
+            if wp.isfinite(wp.float64(pull) * wp.float64(wp.dot(G[a], d))):
                 share = wp.float64(wp.static(1.0 / (2.0 * size)))
                 energy_io[i] = energy_io[i] + wp.float64(C) * wp.float64(pull) * share
-                virial_io[i] = virial_io[i] + w
+                virial_io[i] = virial_io[i] - virial(G[a], d) * wp.float64(pull)
 
     return constraint_measure
 
@@ -110,7 +115,7 @@ def counted_function(law: Solved) -> wp.Function:
 
 @functools.cache
 def virial_kernel(law: Solved) -> wp.Kernel:
-    """Kernel: virial F sum_a grad_a C . x_a of multipliers, F = lam / dt^2, and the energy of
+    """Kernel: virial F sum_a grad_a C x_a^T of multipliers, F = lam / dt^2, and the energy of
     compliant tuples, to each particle its share.
 
     That is C^2 / (2 alpha), and alpha F^2 / 2 where a substep has not brought both together: what
@@ -118,6 +123,7 @@ def virial_kernel(law: Solved) -> wp.Kernel:
     """
     real, Box, Tuples, Bodies = law.types
     size, view, counted = law.size, view_function(law), counted_function(law)
+    virial = virial_function(law.precision, tensor=True)
 
     @register
     def constraint_virial(
@@ -127,7 +133,7 @@ def virial_kernel(law: Solved) -> wp.Kernel:
         t: Tuples,
         b: Bodies,
         energy_io: wp.array(dtype=wp.float64),
-        virial_io: wp.array(dtype=wp.float64),
+        stress_io: wp.array(dtype=Tensor),
     ):
         k = first + wp.tid()
         i = seats.particle[k]
@@ -143,8 +149,8 @@ def virial_kernel(law: Solved) -> wp.Kernel:
                 if F != wp.float64(0.0):
                     twice = wp.min(twice, alpha * F * F)
                 energy_io[i] = energy_io[i] + twice * wp.float64(wp.static(0.5 / size))
-            w = F * wp.float64(wp.dot(G[a], X[a] - X[0]))
-            if wp.isfinite(w):
-                virial_io[i] = virial_io[i] + w
+            d = X[a] - X[0]
+            if wp.isfinite(F * wp.float64(wp.dot(G[a], d))):
+                stress_io[i] = stress_io[i] + virial(G[a], d) * F
 
     return constraint_virial

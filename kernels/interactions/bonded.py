@@ -8,6 +8,7 @@ import warp as wp
 
 from ..engine.loops import Periodicity, box_type, minimum_image
 from ..precision import Precision, function, function_from_source, register, structure
+from ..tensor import virial_function, virial_type
 from .coordinates import steps_type
 
 
@@ -120,11 +121,14 @@ def force_kernel(bonds: Bonds) -> wp.Kernel:
 
 
 @functools.cache
-def measure_kernel(bonds: Bonds) -> wp.Kernel:
-    """Kernel: energy and virial -sum_e g T_e . E_e, to each of a tuple's particles its share."""
+def measure_kernel(bonds: Bonds, tensor: bool) -> wp.Kernel:
+    """Kernel: energy and virial -sum_e g T_e . E_e, to each of a tuple's particles its share.
+
+    ``tensor``: the virial -sum_e g T_e E_e^T, which has no antisymmetric part.
+    """
     Rows, _Steps, Box = bonds.types
-    size, view, real = bonds.size, _view(bonds), bonds.precision.scalar
-    data, params = bonds.data, bonds.params
+    size, view, kind = bonds.size, _view(bonds), virial_type(tensor)
+    data, params, virial = bonds.data, bonds.params, virial_function(bonds.precision, tensor)
 
     @register
     def bonded_measure(
@@ -134,7 +138,7 @@ def measure_kernel(bonds: Bonds) -> wp.Kernel:
         box: wp.array(dtype=Box),
         d: data,
         energy_io: wp.array(dtype=wp.float64),
-        virial_io: wp.array(dtype=wp.float64),
+        virial_io: wp.array(dtype=kind),
     ):
         k = first + wp.tid()
         i = rows.particle[k]
@@ -142,10 +146,8 @@ def measure_kernel(bonds: Bonds) -> wp.Kernel:
         share = wp.float64(wp.static(1.0 / size))
         for n in range(rows.begin[k], rows.begin[k + 1]):
             u, g, T, E = view(rows.ids[n], b, d, parameters[n])
-            w = real(0.0)
-            for e in range(wp.static(size - 1)):
-                w -= g * wp.dot(T[e], E[e])
             energy_io[i] = energy_io[i] + wp.float64(u) * share
-            virial_io[i] = virial_io[i] + wp.float64(w) * share
+            for e in range(wp.static(size - 1)):
+                virial_io[i] = virial_io[i] + virial(-g * T[e], E[e]) * share
 
     return bonded_measure

@@ -9,6 +9,7 @@ import warp as wp
 from ..engine.loops import Pairs, Periodicity, Term, box_type, plain_loop, reader
 from ..engine.packed import FLAGS, packed_loop
 from ..precision import APART, Precision, function, function_from_source, register
+from ..tensor import AXES, Tensor
 from .calls import Call
 
 # A pair closer than p.closest is taken as that far apart, along a fixed direction: coincident
@@ -53,16 +54,33 @@ def virial_term(call: Call, precision: Precision, data: Any, params: Any) -> Ter
 
 
 def energy_term(call: Call, precision: Precision, data: Any, params: Any) -> Term:
-    """Term (u_ij / 2, 0) of the potential energy alone."""
-    result = f"pair2({call.selection.counted('real(0.5) * u')}, real(0.0))"
+    """Term u_ij / 2 of the potential energy alone."""
+    result = f"one({call.selection.counted('real(0.5) * u')})"
     made = _of_law("pair_energy", call, call.potential, result, precision, data, params)
-    return Term(made, 2)
+    return Term(made, 1)
+
+
+def stress_term(call: Call, precision: Precision, data: Any, params: Any, derivative: bool) -> Term:
+    """Term (u_ij, w_ij x x^T / r^2) / 2 of the energy and the virial as a tensor.
+
+    Of a force that is given it has no energy.
+    """
+    u, w = (call.selection.counted(f"real(0.5) * {each}") for each in ("u", "w"))
+    evaluate = f"{call.derivative}{call.potential}    u_half = {u}\n" if derivative else call.force
+    evaluate += f"    w_half = {w}\n{_ALONG}"
+    products = ", ".join(f"w_half * along[{a}] * along[{b}]" for a, b in AXES)
+    result = f"tensor({'u_half' if derivative else 'real(0.0)'}, {products})"
+    made = _of_law("pair_stress", call, evaluate, result, precision, data, params)
+    return Term(made, 1 + len(AXES))
 
 
 def _of_law(
     name: str, call: Call, evaluate: str, result: str, precision: Precision, data: Any, params: Any
 ) -> wp.Function:
-    names = {"law": call.law, "pair2": precision.vector(2), **call.selection.functions()}
+    names = {
+        "law": call.law, "one": precision.vector(1), "pair2": precision.vector(2),
+        "tensor": precision.vector(1 + len(AXES)), **call.selection.functions(),
+    }  # fmt: skip
     lines = call.selection.source() + evaluate
     return _term(name, lines, result, names, precision, data, params)
 
@@ -214,6 +232,32 @@ def store_measure(precision: Precision, data: Any, params: Any, out: Any) -> wp.
         o.virial[particle] = o.virial[particle] + wp.float64(total[1])
 
     return function(keep_measure)
+
+
+@functools.cache
+def store_energy(precision: Precision, data: Any, params: Any, out: Any) -> wp.Function:
+    """Store: the particle's share of energy."""
+    one = precision.vector(1)
+
+    def keep_energy(i: int, particle: int, total: one, d: data, p: params, o: out):
+        o.energy[particle] = o.energy[particle] + wp.float64(total[0])
+
+    return function(keep_energy)
+
+
+@functools.cache
+def store_stress(precision: Precision, data: Any, params: Any, out: Any) -> wp.Function:
+    """Store: the particle's share of energy and of the virial as a tensor."""
+    seven = precision.vector(1 + len(AXES))
+
+    def keep_stress(i: int, particle: int, total: seven, d: data, p: params, o: out):
+        o.energy[particle] = o.energy[particle] + wp.float64(total[0])
+        own = Tensor()
+        for k in range(wp.static(len(AXES))):
+            own[k] = wp.float64(total[1 + k])
+        o.stress[particle] = o.stress[particle] + own
+
+    return function(keep_stress)
 
 
 # Where the result of a sum goes: the row of the slot, or on top of what the particle's row holds.

@@ -10,34 +10,41 @@ from ..random import gamma_function, normal_function, philox
 
 DRAWS = 64  # that a bath may make of one particle or world in a substep
 
+# What may change in time, of each world.
+Ramp = structure(
+    "Ramp",
+    {
+        "times": wp.array(dtype=wp.float64),  # (worlds, knots)
+        "values": wp.array(dtype=wp.float64),
+        "knots": int,
+    },
+)
 Bath = structure(
     "Bath",
     {
         "key": wp.array(dtype=wp.vec2ui),  # the seed
         "count": wp.array(dtype=wp.int64),  # of how often it has acted
-        "times": wp.array(dtype=wp.float64),  # (worlds, knots), of the ramp of temperatures
-        "values": wp.array(dtype=wp.float64),
+        "temperature": Ramp,
         "rate": wp.array(dtype=wp.float64),  # friction, or one over the relaxation time
         "decay": wp.array(dtype=wp.float64),  # what is added to v is decay v,
         "noise": wp.array(dtype=wp.float64),  # and for Langevin's noise sqrt(w) xi
-        "knots": int,
         "place": int,  # among the thermostats of the scene
     },
 )
 
 
 @function
-def temperature(w: int, time: wp.array(dtype=wp.float64), b: Bath):
+def along(w: int, time: wp.array(dtype=wp.float64), r: Ramp):
     """Between the knots of the world's ramp in proportion, beyond its ends as there."""
-    T = b.values[w * b.knots]
-    for k in range(w * b.knots + 1, (w + 1) * b.knots):
-        t, before, after = time[w], b.times[k - 1], b.times[k]
-        rise = b.values[k] - b.values[k - 1]
+    value = r.values[w * r.knots]
+    for k in range(w * r.knots + 1, (w + 1) * r.knots):
+        t, before, after = time[w], r.times[k - 1], r.times[k]
+        rise = r.values[k] - r.values[k - 1]
         if t >= after:
-            T = b.values[k]
+            value = r.values[k]
         elif t > before:
-            T = b.values[k - 1] + rise * ((t - before) / (after - before))
-    return T
+            value = r.values[k - 1] + rise * ((t - before) / (after - before))
+    return value
 
 
 @function
@@ -86,7 +93,7 @@ def langevin_begin_kernel() -> wp.Kernel:
         b.count[w] = b.count[w] + wp.int64(1)
         x = b.rate[w] * dt
         b.decay[w] = -lost(x)
-        b.noise[w] = wp.sqrt(lost(wp.float64(2.0) * x) * temperature(w, time, b))
+        b.noise[w] = wp.sqrt(lost(wp.float64(2.0) * x) * along(w, time, b.temperature))
 
     return langevin_begin
 
@@ -139,9 +146,9 @@ def rescaling(w: int, twice: wp.float64, n: int, T: wp.float64, gained: wp.float
         shape = wp.float64(0.5) * wp.float64(n - 1)
         others = wp.float64(2.0) * _gamma(shape, counter(-1, w, 1, b), b.key[w])
     spread = wp.sqrt(gained * T / twice)
-    along = wp.sqrt(wp.float64(1.0) - gained) + spread * xy[0]
-    factor = wp.sqrt(along * along + spread * spread * others)
-    if along < wp.float64(0.0):
+    first = wp.sqrt(wp.float64(1.0) - gained) + spread * xy[0]
+    factor = wp.sqrt(first * first + spread * spread * others)
+    if first < wp.float64(0.0):
         factor = -factor
     return factor
 
@@ -192,7 +199,7 @@ def rescaling_begin_kernel() -> wp.Kernel:
             twice += sums[k]
         b.decay[w] = wp.float64(0.0)
         if twice > wp.float64(0.0):
-            T = temperature(w, time, b)
+            T = along(w, time, b.temperature)
             factor = rescaling(w, twice, degrees[w], T, lost(b.rate[w] * dt), b)
             b.decay[w] = factor - wp.float64(1.0)
 

@@ -12,15 +12,19 @@ from .. import validate
 from .one_world import worlds_of
 
 
-def _pressure(sim: Any) -> float:
-    """That of the diagnostics, of a box that has a volume."""
-    box = sim.scenes[0].periodic
-    if box is None or not all(box[2]):
-        raise validate.fail(
-            "observe", "pressure", "be of a scene that is periodic on all axes", box,
-            "give a function of the simulation",
-        )  # fmt: skip
-    return sim.diagnostics().pressure[0]
+def _of_box(name: str) -> Callable[[Any], Any]:
+    """What the diagnostics tell of a box that has a volume."""
+
+    def found(sim: Any) -> Any:
+        box = sim.scenes[0].periodic
+        if box is None or not all(box[2]):
+            raise validate.fail(
+                "observe", name, "be of a scene that is periodic on all axes", box,
+                "give a function of the simulation",
+            )  # fmt: skip
+        return getattr(sim.diagnostics(), name)[0]
+
+    return found
 
 
 READY: dict[str, Callable[[Any], Any]] = {
@@ -33,7 +37,8 @@ READY: dict[str, Callable[[Any], Any]] = {
     "angular_momentum": lambda sim: sim.diagnostics().angular_momentum[0],
     "virial": lambda sim: sim.diagnostics().virial[0],
     "temperature": lambda sim: sim.diagnostics().temperature[0],
-    "pressure": _pressure,
+    "pressure": _of_box("pressure"),
+    "stress": _of_box("stress"),
 }
 PARTICLES = ("position", "velocity")  # one vector for each
 

@@ -30,7 +30,8 @@ Observe = Annotated[
     typer.Option(
         metavar="NAME",
         help="Compare this with a reference: position, velocity, energy, kinetic, potential, "
-        "momentum, angular_momentum, virial, temperature, pressure, or a function of the scene.",
+        "momentum, angular_momentum, virial, temperature, pressure, stress, or a function of the "
+        "scene.",
     ),
 ]
 Over = Annotated[

@@ -17,7 +17,8 @@ def measure(
         str,
         typer.Option(
             help="energy, kinetic, potential, momentum, angular_momentum, virial, temperature, "
-            "pressure, a function of the scene's module, MODULE:FUNCTION or FILE.py:FUNCTION."
+            "pressure, stress, a function of the scene's module, MODULE:FUNCTION or "
+            "FILE.py:FUNCTION."
         ),
     ],
     error: Annotated[float, typer.Option(help="Half the width of the interval, at most.")] = 1e-3,

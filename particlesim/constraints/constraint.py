@@ -230,13 +230,13 @@ class Constraint(ConstraintBase):
         ]  # fmt: skip
         launch(self.strain_kernel, self.count, inputs, self.model.device)
 
-    def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
+    def measure_stress(self, state: State, energy: wp.array, stress: wp.array) -> bool:
         """Add the virial of the multipliers of the last substep, and the elastic energy."""
-        if not self.count:
-            return
-        seats = self.tuples.seats
-        inputs = [seats, self.model.box, self.struct, self.bodies, energy, virial]
-        launch(self.virial_kernel, len(seats.particle), inputs, self.model.device)
+        if self.count:
+            seats = self.tuples.seats
+            inputs = [seats, self.model.box, self.struct, self.bodies, energy, stress]
+            launch(self.virial_kernel, len(seats.particle), inputs, self.model.device)
+        return True
 
     def limits(self, probe: Probe) -> list[Limit]:
         """None, as XPBD is implicit; how fast it damps is told."""

@@ -36,6 +36,7 @@ class ConstraintForce(Interaction):
     """
 
     requires = frozenset({"force"})
+    follows_box = True
     reads_velocity = True  # whatever the damping of a world is: worlds go as they go alone
 
     def __init__(self, constraint: Any):
@@ -80,9 +81,8 @@ class ConstraintForce(Interaction):
         constraint, tuples = self.constraint, self.tuples
         self.struct = tuples.struct()
         self.bodies = bodies(model, state)
-        solved = tuples.solved(constraint, state)
-        self.force_kernel = kernels.force_kernel(solved)
-        self.measure_kernel = kernels.measure_kernel(solved)
+        self.solved = tuples.solved(constraint, state)
+        self.force_kernel = kernels.force_kernel(self.solved)
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if self.count:
@@ -94,6 +94,14 @@ class ConstraintForce(Interaction):
         return self.tuples.complaint(self.name)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
+        self._measure(energy, virial, tensor=False)
+
+    def measure_stress(self, state: State, energy: wp.array, stress: wp.array) -> bool:
+        self._measure(energy, stress, tensor=True)
+        return True
+
+    def _measure(self, energy: wp.array, virial: wp.array, tensor: bool) -> None:
         if self.count:
             inputs = [self.seats, self.model.box, self.struct, self.bodies, energy, virial]
-            launch(self.measure_kernel, self.count, inputs, self.model.device)
+            kernel = kernels.measure_kernel(self.solved, tensor)
+            launch(kernel, self.count, inputs, self.model.device)

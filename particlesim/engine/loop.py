@@ -12,9 +12,10 @@ import warp as wp
 
 from .. import validate
 from ..scene.fingerprint import laws_of
-from ..scene.part import ConstraintBase, Interaction, Part, Thermostat
+from ..scene.part import ConstraintBase, Interaction, Part
 from ..scene.scene import Scene
 from ..scene.settings import Settings
+from ..scene.thermostat import Barostat, Thermostat
 from .execution.acting import act
 from .execution.launch import owner
 from .integrators import Integrator, method
@@ -52,6 +53,9 @@ class Loop:
         self.interactions: Sequence[Interaction] = _bound([each.interactions for each in scenes])
         self.constraints: Sequence[ConstraintBase] = _bound([each.constraints for each in scenes])
         self.thermostats: Sequence[Thermostat] = _bound([each.thermostats for each in scenes])
+        for bath in self.thermostats:
+            if isinstance(bath, Barostat):
+                bath.interactions = self.interactions
         self.state, self.neighbors = State(model), Neighbors(model)
         for part in self.parts:
             part.prepare(model, self.neighbors)

@@ -17,6 +17,7 @@ from ..scene import ranges
 from ..scene.group import select
 from ..scene.scene import Scene
 from ..scene.settings import Settings
+from ..scene.thermostat import Barostat
 from .start import start_warp
 
 ROOM = 8  # powers of two that a unit keeps from the ends of a precision
@@ -93,6 +94,7 @@ class Model:
         self.world_of = np.repeat(np.arange(self.world_count), counts)
         ranges.step_fits(settings.substep, self.precision.numpy)
         self.periodic = self._periodicity()
+        self.flexible = any(isinstance(bath, Barostat) for bath in self.scenes[0].thermostats)
         self.box = self._boxes()
         self.attributes = self._attributes()
         for scene in {id(scene): scene for scene in self.scenes}.values():
@@ -132,17 +134,35 @@ class Model:
     def _boxes(self) -> wp.array:
         Box = box_type(self.precision)
         self.box_lower = np.zeros((self.world_count, 3))
-        self.box_length = np.zeros((self.world_count, 3))
+        self.box_start = np.zeros((self.world_count, 3))
         for w, scene in enumerate(self.scenes):
             if scene.periodic:
                 self.box_lower[w] = scene.periodic[0]
-                self.box_length[w] = scene.periodic[1] - scene.periodic[0]
-        inverse = np.divide(
-            1.0, self.box_length, out=np.zeros_like(self.box_length), where=self.box_length > 0
-        )
-        columns = {"lower": self.box_lower, "length": self.box_length, "inverse": inverse}
-        self.fits("Scene", {"periodic": np.stack([self.box_length, inverse])})
-        return self.structures(Box, columns)
+                self.box_start[w] = scene.periodic[1] - scene.periodic[0]
+        lower, length, inverse = np.split(self.boxes_at_start(), 3, axis=1)
+        self.fits("Scene", {"periodic": np.stack([length, inverse])})
+        return self.structures(Box, {"lower": lower, "length": length, "inverse": inverse})
+
+    def boxes_at_start(self) -> np.ndarray:
+        """The numbers of the scenes' boxes: lower corner, lengths, one over these, (worlds, 9)."""
+        length = self.box_start
+        inverse = np.divide(1.0, length, out=np.zeros_like(length), where=length > 0)
+        return np.concatenate([self.box_lower, length, inverse], axis=1)
+
+    @property
+    def box_length(self) -> np.ndarray:
+        """Lengths of the worlds' boxes at present, (worlds, 3) [length]; 0 where an axis is open.
+
+        ``box_start`` are those of the scenes, from which a barostat takes them away.
+        """
+        if not self.flexible:
+            return self.box_start
+        return self.box.numpy()["length"].astype(np.float64)
+
+    def numbers(self, boxes: wp.array) -> wp.array:
+        """The numbers of boxes, in their own memory, a row a world: lower, length, inverse."""
+        kind = self.precision.vector(9)
+        return wp.array(ptr=boxes.ptr, shape=len(boxes), dtype=kind, device=self.device)
 
     def structures(self, kind: Any, columns: dict[str, np.ndarray]) -> wp.array:
         """An array of ``wp.struct`` from one host column a field."""
@@ -173,7 +193,7 @@ class Model:
         """
         if not len(rows):
             return ""
-        x, _ = self.wrapped(self.column("position"), self.world_of)
+        x, _ = self.wrapped(self.column("position"), self.world_of, self.box_start)
         far = np.abs(x).max(axis=1)[rows.reshape(len(rows), -1)].max(axis=1)
         lengths = np.broadcast_to(np.asarray(lengths, dtype=np.float64), far.shape)
         return ranges.unresolved(owner, name, lengths, far, self.precision.numpy, part)
@@ -227,17 +247,22 @@ class Model:
             parts.append(part if part.shape == shape else np.zeros(shape))
         return np.concatenate(parts)
 
-    def wrapped(self, position: np.ndarray, world: Any) -> tuple[np.ndarray, np.ndarray]:
+    def wrapped(
+        self, position: np.ndarray, world: Any, boxes: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Positions moved into the periodic box of their world, lower <= x < lower + L, and images.
+
+        ``boxes`` are the lengths L of the worlds; None: those at present.
 
         They are so in the precision of the kernels too: what would round to the upper corner comes
         to the lower, which is the same place. The images, whole numbers n, say where from: x + n L.
         """
         real = self.precision.numpy
-        lower, length = self.box_lower[world], self.box_length[world]
+        lower = self.box_lower[world]
+        length = (self.box_length if boxes is None else boxes)[world]
         upper = lower.astype(real) + length.astype(real)
-        boxes = np.divide(position - lower, length, out=np.zeros_like(position), where=length > 0)
-        image = np.floor(boxes)
+        away = np.divide(position - lower, length, out=np.zeros_like(position), where=length > 0)
+        image = np.floor(away)
         image += (length > 0) & ((position - length * image).astype(real) >= upper)
         inside = position - length * image
         return np.where(length > 0, np.maximum(inside, lower), inside), image

@@ -16,6 +16,7 @@ from ..scene.part import Part
 from .execution.copies import copy
 from .loop import Loop
 from .observers import Observer
+from .state import OF_WORLDS
 
 # Made anew in every substep, or never changed: nothing to keep.
 TRANSIENT = frozenset(
@@ -97,7 +98,7 @@ class Snapshot:
         model = self.loop.model
         kind, _, rest = name.partition("/")
         if kind == "state" or rest in self.loop.state:
-            return np.arange(model.world_count) if rest == "time" else model.world_of
+            return np.arange(model.world_count) if rest in OF_WORLDS else model.world_of
         for owner, part in self._owners.items():
             if rest.startswith(f"{owner}_"):
                 return part.worlds(rest.removeprefix(f"{owner}_"), array)

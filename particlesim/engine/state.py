@@ -31,6 +31,7 @@ FIELDS: dict[str, int | None] = {
     "density": None,
     "pressure": None,
 }
+OF_WORLDS = frozenset({"time", "box"})  # a row a world
 START = frozenset({"position", "velocity", "mass", "radius"})  # come from the scene; others: zero
 
 
@@ -56,6 +57,8 @@ class State:
                 self.arrays[name] = model.array(self.start(name), wp.vec3i)
             elif name == "world":
                 self.arrays[name] = model.array(model.world_of, wp.int32)
+            elif name == "box":
+                self.arrays[name] = model.numbers(model.box)
             elif name == "time":
                 self.arrays[name] = wp.zeros(
                     model.world_count, dtype=wp.float64, device=model.device
@@ -85,8 +88,10 @@ class State:
         if name == "inverse_mass":
             pinned = model.column("pinned") > 0
             return np.where(pinned, 0.0, 1.0 / np.maximum(model.column("mass"), 1e-300))
+        if name == "box":
+            return model.boxes_at_start()
         if name in ("position", "image"):
-            x, image = model.wrapped(model.column("position"), model.world_of)
+            x, image = model.wrapped(model.column("position"), model.world_of, model.box_start)
             return x if name == "position" else image.astype(np.int32)
         if name in START or name in model.attributes:
             return model.column(name)
@@ -142,7 +147,7 @@ class State:
             host = array.numpy().copy()
             start = self.start(name)
             for w in worlds:
-                rows = slice(w, w + 1) if name == "time" else slice(offsets[w], offsets[w + 1])
+                rows = slice(w, w + 1) if name in OF_WORLDS else slice(offsets[w], offsets[w + 1])
                 host[rows] = 0 if start is None else start[rows]
             array.assign(host)
 

@@ -17,6 +17,7 @@ from ..engine.model import Model
 from ..engine.report import Report, grid
 from ..kernels.instruments.sums import QUANTITIES, block_sums_kernel
 from ..kernels.precision import FLOAT64
+from ..kernels.tensor import Tensor, matrices
 
 SHOWN = 20  # worlds of a table
 BLOCK = 256  # particles summed by one thread
@@ -31,6 +32,12 @@ class Diagnostics(Report):
     (worlds,), to which constraints between particles and contacts add that of the last substep.
     Pinned particles count in the mass and the potential energy only; ``free`` is how many are not,
     and ``volume`` that of the periodic box, not a number where an axis is open, (worlds,).
+
+    ``stress`` is the pressure as a tensor, P_ab V = sum m v_a v_b + sum r_a F_b (Irving and
+    Kirkwood 1950), of which the mean of the diagonal is ``pressure``: positive where it pushes, as
+    minus the stress of solids, symmetric, (worlds, 3, 3) [energy/length^3]. It is not a number
+    where an axis is open, or where something gives its virial as one number: a fluid, a tree,
+    an Ewald sum, contacts.
     """
 
     mass: np.ndarray
@@ -41,6 +48,7 @@ class Diagnostics(Report):
     virial: np.ndarray
     free: np.ndarray
     volume: np.ndarray
+    stress: np.ndarray
 
     @property
     def energy(self) -> np.ndarray:
@@ -127,15 +135,18 @@ def _measure(sim: Source, forces: Source, potentials: list[np.ndarray] | None) -
     """The diagnostics, with the energies of the interactions of ``forces``."""
     model, state, device = sim.model, sim.state, sim.model.device
     energy = wp.zeros(model.particle_count, dtype=wp.float64, device=device)
-    virial = wp.zeros_like(energy)
+    virial = wp.zeros_like(energy)  # of what does not know it as a tensor
+    stress = wp.zeros(model.particle_count, dtype=Tensor, device=device)
     with undisturbed(forces):
         forces.neighbors.update(forces.state)
         forces.neighbors.grow()
         for constraint in sim.constraints:
-            constraint.measure(state, energy, virial)
+            if not constraint.measure_stress(state, energy, stress):
+                constraint.measure(state, energy, virial)
         for interaction in forces.interactions:
             before = energy.numpy().copy() if potentials is not None else None
-            interaction.measure(forces.state, energy, virial)
+            if not interaction.measure_stress(forces.state, energy, stress):
+                interaction.measure(forces.state, energy, virial)
             if potentials is not None:
                 own = energy.numpy() - before
                 potentials.append(np.bincount(model.world_of, own, model.world_count))
@@ -146,7 +157,8 @@ def _measure(sim: Source, forces: Source, potentials: list[np.ndarray] | None) -
         len(begin),
         [
             model.array(begin, wp.int32), model.array(end, wp.int32), state.position,
-            state.velocity, state.held("mass"), state.held("inverse_mass"), energy, virial, sums,
+            state.velocity, state.held("mass"), state.held("inverse_mass"), energy, virial, stress,
+            sums,
         ],
         device,
     )  # fmt: skip
@@ -155,9 +167,10 @@ def _measure(sim: Source, forces: Source, potentials: list[np.ndarray] | None) -
     free = np.bincount(model.world_of, model.column("pinned") == 0, model.world_count)
     length = model.box_length
     volume = np.where((length > 0).all(axis=1), length.prod(axis=1), np.nan)
+    known = np.where(total[:, 10] == 0.0, volume, np.nan)[:, None, None]
     return Diagnostics(
         total[:, 0], total[:, 1:4], total[:, 4:7], total[:, 7], total[:, 8], total[:, 9], free,
-        volume,
+        volume, matrices(total[:, 11:]) / known,
     )  # fmt: skip
 
 

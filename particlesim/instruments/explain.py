@@ -10,6 +10,8 @@ from ..engine.frames import Frames
 from ..engine.report import Report
 from ..scene.scene import ARGUMENTS
 
+LISTS = "pair lists"  # who launches for them
+
 
 @dataclass(frozen=True, repr=False)
 class Explanation(Report):
@@ -18,7 +20,7 @@ class Explanation(Report):
     arrays: bytes per particle of each array of the state. unread: attributes of the particles that
     no part reads, and so have none. lists: one line for each pair list.
     launches: (owner, kernel, rows) of each launch of a substep; ``conditional`` ones run only
-    when neighbour lists are rebuilt.
+    when neighbour lists are rebuilt, or their part is due, as a barostat that scales the box.
     """
 
     title: str
@@ -46,9 +48,12 @@ class Explanation(Report):
         if self.unread:
             lines += [f"  of no part's: {', '.join(self.unread)}"]
         lines += ["", "pair lists", *([f"  {line}" for line in self.lists] or ["  none"])]
+        rebuilt = [each for each in self.conditional if each[0] == LISTS]
+        due = [each for each in self.conditional if each[0] != LISTS]
         for heading, launches in (
             (f"a substep: {len(self.launches)} launches", self.launches),
-            ("when neighbour lists are rebuilt", self.conditional),
+            ("when neighbour lists are rebuilt", rebuilt),
+            ("when they are due", due),
         ):
             if launches:
                 lines += ["", heading]

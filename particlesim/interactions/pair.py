@@ -58,6 +58,7 @@ class Pair(Interaction):
         switch: In parts of the cutoff.
     """
 
+    follows_box = True
     listed = True  # sums over a list of pairs, in one pass with others that share it
 
     def __init__(
@@ -202,12 +203,22 @@ class Pair(Interaction):
         return probe.response(self) + ([] if self.cutoff is None else collisions(self, probe))
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
+        make = kernels.measure_term if self.derived else kernels.virial_term
         out = {"energy": energy, "virial": virial}
-        if self.derived:
-            terms = [self._term(kernels.measure_term, 0)]
-        else:
-            terms = [self._term(kernels.virial_term, -1)]
-            if self.potential is not None:
-                terms.append(self._term(kernels.energy_term, 0))
-        for term in terms:
-            self.loop.sum(term, kernels.store_measure, out)
+        self.loop.sum(self._term(make, 0 if self.derived else -1), kernels.store_measure, out)
+        self._measure_energy(energy)
+
+    def measure_stress(self, state: State, energy: wp.array, stress: wp.array) -> bool:
+        if type(self).measure is not Pair.measure:  # a member that has more than pairs
+            return False
+        k = 0 if self.derived else -1
+        term = self._term(kernels.stress_term, k, derivative=self.derived)
+        self.loop.sum(term, kernels.store_stress, {"energy": energy, "stress": stress})
+        self._measure_energy(energy)
+        return True
+
+    def _measure_energy(self, energy: wp.array) -> None:
+        """Add the potential, where it is not derived for the force."""
+        if not self.derived and self.potential is not None:
+            term = self._term(kernels.energy_term, 0)
+            self.loop.sum(term, kernels.store_energy, {"energy": energy})

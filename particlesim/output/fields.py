@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import validate
 from ..engine.loop import Source
+from ..engine.state import OF_WORLDS
 from ..interactions.fluid.sph import SPH
 from . import colors
 
@@ -82,7 +83,7 @@ def readable(sim: Source) -> list[str]:
     held = {
         name
         for name, array in sim.state.arrays.items()
-        if len(array) == sim.model.particle_count and name != "time"
+        if len(array) == sim.model.particle_count and name not in OF_WORLDS
     }
     return sorted(held | set(sim.model.attributes) | set(DERIVED))
 

@@ -79,6 +79,10 @@ class Part:
         """What is to be said of the start, once a run begins; empty where it fits."""
         return ""
 
+    def fault(self, world: int) -> str:
+        """Why it has made the numbers of a world no numbers; empty where it has not."""
+        return ""
+
     def persistent(self) -> dict[str, Any]:
         """Arrays that outlive a substep, for snapshots and checkpoints."""
         return {}
@@ -158,6 +162,8 @@ class Interaction(Part):
     cutoff: float | None = None
     reads_velocity: bool | None = None  # in any other way than that of ``follow``
     conservative: bool = False  # `measure` adds the potential of all that it does
+    # It is right in ``model.box`` as it is at present, also for ``measure`` (see ``Barostat``).
+    follows_box: bool = False
     # Adds its force to ``implicit_force`` too, where that is kept, df/dv to ``force_slope``, and
     # has ``follow``.
     implicit: bool = False
@@ -190,6 +196,14 @@ class Interaction(Part):
     def measure(self, state: Any, energy: Any, virial: Any) -> None:
         """Add the potential energy and the virial of each particle (float64), on demand."""
 
+    def measure_stress(self, state: Any, energy: Any, stress: Any) -> bool:
+        """The same with the virial as a tensor, r_a F_b made symmetric: xx, yy, zz, yz, xz, xy.
+
+        Returns:
+            Whether it is known, and was added; if not, ``measure`` tells at least its trace.
+        """
+        return False
+
     def limits(self, probe: Any) -> list[Any]:
         """Bounds on the substep at the present state (see ``Simulation.stability``).
 
@@ -205,24 +219,6 @@ class Interaction(Part):
             name: np.array(row, np.int32 if isinstance(row[0], np.integer) else np.float64)
             for name, row in rows.items()
         }
-
-
-class Thermostat(Part):
-    """A heat bath: it changes velocities in the middle of every drift, in turn with the others.
-
-    What ``exchange`` may do is what ``apply`` of an :class:`Interaction` may. It is called by
-    ``Integrator.drift`` and ``move``; a method of which stages go back in time takes none.
-    """
-
-    requires: frozenset[str] = frozenset({"velocity"})
-
-    def exchange(self, state: Any, dt: float) -> None:
-        """Change velocities as the bath does in ``dt``."""
-        raise validate.undefined(self, "exchange(self, state, dt)")
-
-    def fastest(self, scene: Any) -> float:
-        """What a component of a velocity that it gives is about, at most [length/time]."""
-        return 0.0
 
 
 class ConstraintBase(Part):
@@ -280,6 +276,10 @@ class ConstraintBase(Part):
 
     def measure(self, state: Any, energy: Any, virial: Any) -> None:
         """Add the virial of each particle (float64) in the last substep, on demand."""
+
+    def measure_stress(self, state: Any, energy: Any, stress: Any) -> bool:
+        """The same as a tensor, as of :class:`Interaction`; False: it is not known."""
+        return False
 
     def read_force(self, part: Part) -> np.ndarray:
         """See ``Simulation.force``; ``part`` is this, or the one of some worlds' scenes."""

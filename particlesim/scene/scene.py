@@ -11,7 +11,8 @@ import numpy as np
 from .. import validate
 from .bounds import corners, periodic_box
 from .group import PALETTE, Color, Group
-from .part import ConstraintBase, Interaction, Thermostat
+from .part import ConstraintBase, Interaction
+from .thermostat import Barostat, Thermostat
 
 # Names of the engine's own per-particle arrays, which attributes of a scene cannot take.
 RESERVED = frozenset(
@@ -192,13 +193,33 @@ class Scene:
 
     def add_thermostat(self, thermostat: Thermostat) -> Thermostat:
         """Add a heat bath; it acts in the middle of every drift, in the order of adding."""
-        if not isinstance(thermostat, Thermostat):
+        if not isinstance(thermostat, Thermostat) or isinstance(thermostat, Barostat):
             raise TypeError(
                 f"Scene.add_thermostat: thermostat must be a Thermostat, got {thermostat!r}; "
                 "make a Langevin or a VelocityRescaling."
             )
         self._add(self.thermostats, "thermostat", thermostat)
         return thermostat
+
+    def add_barostat(self, barostat: Barostat) -> Barostat:
+        """Add what holds the pressure; it acts as a thermostat does, and after those before it."""
+        if not isinstance(barostat, Barostat):
+            raise TypeError(
+                f"Scene.add_barostat: barostat must be a Barostat, got {barostat!r}; "
+                "make a CellRescaling."
+            )
+        owner = "Scene.add_barostat"
+        if self.periodic is None or not all(self.periodic[2]):
+            raise validate.fail(
+                owner, "scene", "be periodic along all axes", self.periodic,
+                "give Scene(periodic=...)",
+            )  # fmt: skip
+        if any(isinstance(each, Barostat) for each in self.thermostats):
+            raise validate.fail(
+                owner, "barostat", "be the only one of the scene", barostat, "leave one out"
+            )
+        self._add(self.thermostats, "barostat", barostat)
+        return barostat
 
     def _add(self, parts: list[Any], kind: str, part: Any) -> None:
         if any(part is each for each in parts):

@@ -27,9 +27,10 @@ from ..interactions.fluid.sph import SPH
 from ..output import checkpoint
 from ..pictures.render.camera import Camera
 from ..pictures.render.image import Image
-from ..scene.part import ConstraintBase, Interaction, Thermostat
+from ..scene.part import ConstraintBase, Interaction
 from ..scene.scene import Scene
 from ..scene.settings import Settings
+from ..scene.thermostat import Thermostat
 from .access import Access, World, Writer
 
 
@@ -120,7 +121,7 @@ class Reading(Access):
             Of a constraint on tuples the estimate on the end that feels most, |lam| |grad C| /
             dt^2, (m,), in the order of its tuples; world by world where it stands for several. Of a
             boundary what particles exert on it, (3,), or (worlds, 3) where it stands for several:
-            those that touch it, and the pressure of fluids, without what one that sticks to it drags.
+            those that touch it, and the pressure of fluids, without what one that sticks drags.
 
         Raises:
             ValueError: It is no part of this simulation, or neither of these.

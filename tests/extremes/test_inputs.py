@@ -40,6 +40,8 @@ PARTS = {
         "level": 0.0,
     },
     ps.BoxBoundary: {"lower": (0, 0, 0), "upper": (1, 1, 1), "friction": 0.1, "restitution": 0.5},
+    ps.CellRescaling: {"pressure": 1.0, "compressibility": 1.0, "relaxation_time": 1.0,
+                       "temperature": 1.0, "interval": 5},
     ps.ConstantForce: {"force": (0, 1, 0)},
     ps.Constraint: {
         "law": above, "particles": [[0]], "compliance": 0.1, "damping": 0.1, "break_force": 1.0,
@@ -86,7 +88,7 @@ NEVER = {
 INDICES = {"pairs", "triples", "quadruples", "particles"}
 SIGNED = {"velocity", "angular_velocity", "pivot", "drawn",
           "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
-          "periodic", "G"}  # fmt: skip
+          "periodic", "G", "pressure"}  # fmt: skip
 
 
 def numbers_of(part):

@@ -97,10 +97,13 @@ def forces():
     return scene
 
 
-def few_forces(periodic, count):
+def few_forces(periodic, count, pressed=False):
     scene = particles(count, periodic)
     scene.add_interaction(ps.PairPotential(screened, cutoff=2.4, screening=1.0, power=2))
     scene.add_interaction(ps.Springs([(0, 1)], 1.0, 1.0))
+    if pressed:
+        given = {"compressibility": 1.0, "relaxation_time": 1.0, "temperature": 1.0}
+        scene.add_barostat(ps.CellRescaling(pressure=1.0, **given))
     return scene
 
 
@@ -166,7 +169,7 @@ SCENES = {
     "forces": (forces, {"ledger": True}),
     "charged": (charged, {}),
     "damped": (damped, VERLET),
-    "periodic_forces": (lambda: few_forces(BOX, 600), VERLET | {"compensated": False}),
+    "periodic_forces": (lambda: few_forces(BOX, 600, True), VERLET | {"compensated": False}),
     "small_periodic_world": (lambda: few_forces(BOX, 20), {}),
     "fluid": (lambda: fluid(None, viscosity=ps.ArtificialViscosity(0.1)), {}),
     "periodic_fluid": (

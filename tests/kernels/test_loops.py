@@ -9,6 +9,7 @@ import warp as wp
 
 import particlesim as ps
 from particlesim.engine.model import Model
+from particlesim.kernels.tensor import Tensor, matrices
 
 SIDE = 7.0
 CUTOFF = 2.5
@@ -144,6 +145,13 @@ def test_forces_energy_and_virial_are_the_sums(name, periodic, vectorised, preci
     measured = sim.diagnostics()
     assert abs(measured.potential[0] - energy.sum() / 2) <= steps * np.abs(energy).sum()
     assert abs(measured.virial[0] - virial.sum() / 2) <= steps * np.abs(virial).sum()
+    found = wp.zeros(COUNT, dtype=Tensor, device=device)
+    unused = wp.zeros(COUNT, dtype=wp.float64, device=device)
+    part = sim.interactions[0]
+    if part.measure_stress(sim.state, unused, found):  # gravity may have more than pairs
+        tensor = np.einsum("ij,ija,ijb->iab", size / near, d, d) / 2
+        error = np.abs(matrices(found.numpy()) - tensor).max(axis=(1, 2))
+        assert (error <= steps * np.abs(virial).sum(axis=1)).all()
 
 
 @pytest.mark.parametrize("periodic", [False, True])

@@ -4,6 +4,9 @@ The grid is built in cell coordinates u = turn (x - origin), in which every cell
 ``turn`` scales, and takes the axes in the order that has the grid's order follow the particles'
 own. On a periodic axis it scales by cells / length, so that the grid's wrap by modulo is exactly
 the periodicity of the box, whatever its shape. Slots (the loop's order) follow the grid's order.
+
+Where a barostat scales the boxes (``flexible``), rows are made in a box that stays as it was then:
+positions since are compared with where that scaling alone would have taken them.
 The rows themselves are made in :mod:`particlesim.kernels.engine.neighbors.rows`.
 """
 
@@ -13,18 +16,35 @@ from typing import Any
 
 import warp as wp
 
-from ...precision import Precision, native, register, structure
+from ...precision import Precision, function, native, register, structure
 from ...warp_internals import elements
 from ..atomics import rise_function
 from ..loops import Periodicity, box_type, minimum_image
 
 
 def cells_type(precision: Precision) -> Any:
-    """Origin and turn of a world's cell coordinates, and the first slot of the world."""
-    return structure(
-        f"Cells_{precision.name}",
-        {"origin": precision.vec3, "turn": precision.mat33, "first": wp.int32, "world": wp.int32},
-    )
+    """Origin and turn of a world's cell coordinates, and the first slot of the world.
+
+    ``length`` are the lengths of the box that they are for, 0 on open axes.
+    """
+    fields = {
+        "origin": precision.vec3, "turn": precision.mat33, "first": wp.int32, "world": wp.int32,
+        "length": precision.vec3,
+    }  # fmt: skip
+    return structure(f"Cells_{precision.name}", fields)
+
+
+def scaled_function(precision: Precision, flexible: bool) -> wp.Function:
+    """``scaled(x, then, now)``: where a point is taken to by a box that is scaled."""
+    vec3, Box = precision.vec3, box_type(precision)
+
+    def scaled(x: vec3, then: Box, now: Box):
+        result = x
+        if wp.static(flexible):
+            result = now.lower + wp.cw_mul(x - then.lower, wp.cw_mul(now.length, then.inverse))
+        return result
+
+    return function(scaled)
 
 
 def blocks_type(precision: Precision) -> Any:
@@ -47,14 +67,16 @@ BLOCK = 64  # slots that a thread of the CPU looks at
 
 
 @functools.cache
-def moved_kernel(precision: Precision, periodic: Periodicity, block: int = 1) -> wp.Kernel:
+def moved_kernel(
+    precision: Precision, periodic: Periodicity, flexible: bool, block: int = 1
+) -> wp.Kernel:
     """Flag each world in which a slot has moved further than its margin (half the skin).
 
     A thread looks at ``block`` slots.
     """
     vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
-    image = minimum_image(precision, periodic)
-    stayed = _stayed(precision, periodic)
+    image, scaled = minimum_image(precision, periodic), scaled_function(precision, flexible)
+    stayed = _stayed(precision, periodic, flexible)
 
     @functools.partial(register, cpu_only=block > 1)
     def flag_moved(
@@ -62,6 +84,7 @@ def moved_kernel(precision: Precision, periodic: Periodicity, block: int = 1) ->
         members: wp.array(dtype=wp.int32),
         world: wp.array(dtype=wp.int32),
         box: wp.array(dtype=Box),
+        box_listed: wp.array(dtype=Box),
         margin_squared: wp.array(dtype=real),
         x: wp.array(dtype=vec3),
         x_listed: wp.array(dtype=vec3),
@@ -71,11 +94,13 @@ def moved_kernel(precision: Precision, periodic: Periodicity, block: int = 1) ->
         begin = (first + wp.tid()) * wp.static(block)
         end = wp.min(begin + wp.static(block), members.shape[0])
         if wp.static(block > 1):
-            if stayed(begin, end, members, world, box, margin_squared, x, x_listed) != 0:
+            still = stayed(begin, end, members, world, box, box_listed, margin_squared, x, x_listed)
+            if still != 0:
                 end = begin
         for k in range(begin, end):
             w = world[k]
-            d = image(x[members[k]] - x_listed[k], box[w])
+            there = scaled(x_listed[k], box_listed[w], box[w])
+            d = image(x[members[k]] - there, box[w])
             if wp.dot(d, d) > margin_squared[w]:
                 # Every writer writes the same, and once: threads would fight over the cache line.
                 if moved[w] == 0:
@@ -86,7 +111,7 @@ def moved_kernel(precision: Precision, periodic: Periodicity, block: int = 1) ->
     return flag_moved
 
 
-def _stayed(precision: Precision, periodic: Periodicity) -> wp.Function:
+def _stayed(precision: Precision, periodic: Periodicity, flexible: bool) -> wp.Function:
     """``stayed(begin, end, ...)``: 1 if it is quickly seen that none of these slots has moved far.
 
     It is where they are of one world, and particles that follow each other.
@@ -97,20 +122,23 @@ def _stayed(precision: Precision, periodic: Periodicity) -> wp.Function:
         for a, on in enumerate(periodic)
         if on
     )
+    there = "then[3 * k + a]"
+    if flexible:
+        there = f"(b.lower[a] + ({there} - o.lower[a]) * (b.length[a] * o.inverse[a]))"
     snippet = f"""
     const int *all = {elements("members", "int")} + begin, i = all[0];
     const int w = {elements("world", "int")}[begin];
     int apart = {elements("world", "int")}[end - 1] - w;
     for (int k = 0; k < end - begin; ++k) apart |= all[k] - i - k;
     if (apart) return 0;
-    const auto b = box.data[w];
+    const auto b = box.data[w], o = box_listed.data[w];
     const {c} margin = {elements("margin_squared", c)}[w];
     const {c}* now = {elements("x", c)} + 3 * (long long)i;
     const {c}* then = {elements("x_listed", c)} + 3 * (long long)begin;
     int far = 0;
     for (int k = 0; k < end - begin; ++k) {{
         {c} d[3];
-        for (int a = 0; a < 3; ++a) d[a] = now[3 * k + a] - then[3 * k + a];
+        for (int a = 0; a < 3; ++a) d[a] = now[3 * k + a] - {there};
         {nearest}
         far |= d[0] * d[0] + d[1] * d[1] + d[2] * d[2] > margin;
     }}
@@ -119,18 +147,32 @@ def _stayed(precision: Precision, periodic: Periodicity) -> wp.Function:
 
     def stayed(
         begin: int, end: int, members: wp.array(dtype=wp.int32), world: wp.array(dtype=wp.int32),
-        box: wp.array(dtype=Box), margin_squared: wp.array(dtype=precision.scalar),
-        x: wp.array(dtype=vec3), x_listed: wp.array(dtype=vec3),
+        box: wp.array(dtype=Box), box_listed: wp.array(dtype=Box),
+        margin_squared: wp.array(dtype=precision.scalar), x: wp.array(dtype=vec3),
+        x_listed: wp.array(dtype=vec3),
     ) -> int: ...  # fmt: skip
 
     return native(stayed, snippet, after_gradients=False)
 
 
 @functools.cache
-def positions_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
+def among_kernel() -> wp.Kernel:
+    """Kernel over worlds: those that are not among the chosen keep their rows."""
+
+    @register
+    def keep_rows(first: int, chosen: wp.array(dtype=wp.int32), moved_io: wp.array(dtype=wp.int32)):
+        w = first + wp.tid()
+        if chosen[w] == 0:
+            moved_io[w] = 0
+
+    return keep_rows
+
+
+@functools.cache
+def positions_kernel(precision: Precision, periodic: Periodicity, flexible: bool) -> wp.Kernel:
     """Kernel: positions that rows are made from, and how far they are from the last ones."""
     vec3, Box, image = precision.vec3, box_type(precision), minimum_image(precision, periodic)
-    rise = rise_function()
+    rise, scaled = rise_function(), scaled_function(precision, flexible)
 
     @register
     def take_positions(
@@ -138,6 +180,7 @@ def positions_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
         members: wp.array(dtype=wp.int32),
         world: wp.array(dtype=wp.int32),
         box: wp.array(dtype=Box),
+        box_listed: wp.array(dtype=Box),
         moved: wp.array(dtype=wp.int32),
         x: wp.array(dtype=vec3),
         x_listed_io: wp.array(dtype=vec3),
@@ -147,7 +190,7 @@ def positions_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
         w = world[k]
         if moved[w] != 0:
             now = x[members[k]]
-            d = image(now - x_listed_io[k], box[w])
+            d = image(now - scaled(x_listed_io[k], box_listed[w], box[w]), box[w])
             rise(w, wp.float32(wp.dot(d, d)), farthest_squared)
             x_listed_io[k] = now
 

@@ -10,6 +10,7 @@ import warp as wp
 
 from ...precision import Precision, function, register
 from ..loops import Pairs, Periodicity, box_type, minimum_image
+from .boxes import cell_function
 from .renewal import blocks_type, cells_type
 
 
@@ -62,11 +63,12 @@ def row_functions(precision: Precision, periodic: Periodicity) -> tuple[wp.Funct
 
 
 @functools.cache
-def grid_rows_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
+def grid_rows_kernel(precision: Precision, periodic: Periodicity, flexible: bool) -> wp.Kernel:
     """Rows of one block's slots from the hash grid of one; ``more``: behind what is in them."""
     vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
     Cells, Blocks = cells_type(precision), blocks_type(precision)
     _of_range, of_cells = row_functions(precision, periodic)
+    cell = cell_function(precision, flexible)
 
     @register
     def grid_rows(
@@ -87,12 +89,15 @@ def grid_rows_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
     ):
         i = begin + first + wp.tid()
         room = blocks.room[blocks.of[i]]
-        u = cells.turn * (vec3(x[0, i], x[1, i], x[2, i]) - cells.origin)
+        b = box[cells.world]
+        u = cell(vec3(x[0, i], x[1, i], x[2, i]), cells, b)
         n = int(0)
         if more != 0:
             n = found_io[i]
-        b = box[cells.world]
-        n = of_cells(i, n, grid, u, radius, cells, slot, room, pairs, b, x, reach_squared)
+        wide = radius
+        if wp.static(flexible):  # cells have grown with the box
+            wide = radius * cells.length[0] * b.inverse[0]
+        n = of_cells(i, n, grid, u, wide, cells, slot, room, pairs, b, x, reach_squared)
         found_io[i] = n
         pairs.count[i] = wp.min(n, room)
         if n > room:

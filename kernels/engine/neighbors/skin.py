@@ -11,6 +11,7 @@ from .renewal import blocks_type
 IDLE = 64.0  # substeps, after which rows with too thick a skin are not worth keeping
 WORTH = 0.7  # of a skin, below which a thinner one is worth new rows
 THINNEST, THICKEST = 0.03, 0.6  # skins, in cutoffs
+HALF = 0.499  # of a skin: a hair less than half, for the rounding of the distances compared
 SPARE = 1.1  # times as thick, for what goes faster than before
 
 
@@ -108,8 +109,7 @@ def reach_kernel(precision: Precision) -> wp.Kernel:
             for other in range(blocks.first[w + 1] - blocks.first[w]):
                 reach = blocks.cutoff[k, other] + thick
                 blocks.reach_squared[k, other] = real(reach * reach)
-        # A hair less than half the skin, for the rounding of the distances compared.
-        half = wp.float64(0.499) * thick
+        half = wp.float64(HALF) * thick
         for phase in range(2):
             if margins_io[phase, w] != real(wp.inf):
                 margins_io[phase, w] = real(half * half)

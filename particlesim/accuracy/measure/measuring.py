@@ -53,7 +53,7 @@ def measure(
             ``frames`` hold where None is given.
         observe: A function of the simulation: a number, or one a world, (worlds,), with which seeds
             run as one batch. Or ``"energy"``, ``"kinetic"``, ``"potential"``, ``"virial"``,
-            ``"temperature"`` (k T), ``"pressure"``, ``"momentum"``, ``"angular_momentum"`` (sizes).
+            ``"temperature"``, ``"pressure"``, ``"momentum"``, ``"angular_momentum"``, ``"stress"``.
         error: Half the width of the interval, at most [unit of what is observed].
         confidence: With which the interval is to hold the true value.
         over: ``"final"``, at the end; ``"max"`` or ``"rms"``, of start and frames; ``"period"``, of

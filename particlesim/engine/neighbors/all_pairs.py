@@ -85,7 +85,9 @@ class AllPairs:
                 self.fields[name] = source
         self.sort_held()
 
-    def update(self, state: State, *, for_constraint: bool = False) -> None:
+    def update(
+        self, state: State, *, for_constraint: bool = False, among: wp.array | None = None
+    ) -> None:
         """Bring the slot-ordered copies up to date."""
         self.gather(state, self.names)
 

@@ -41,6 +41,7 @@ def grid_over(model: Model, block: Block, reach: float, x: np.ndarray) -> tuple[
     grid = wp.HashGrid(*dimensions, device=model.device, dtype=model.precision.scalar)
     grid.reserve(len(x))
     place = kernels.cells_type(model.precision)()
+    place.length = model.precision.vec3(*model.box_length[w])
     place.origin = model.precision.vec3(*np.where(backward, upper, lower))
     place.turn = model.precision.mat33(turn)
     place.first, place.world = block.begin, w

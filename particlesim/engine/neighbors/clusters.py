@@ -161,18 +161,18 @@ class ClusterRows:
             launch(
                 halve.blocks,
                 len(listed.blocks),
-                [listed.moved, self.columns, model.box, listed.members, listed.x_listed,
+                [listed.moved, self.columns, listed.box, listed.members, listed.x_listed,
                  listed.order, self.planes],
                 device,
             )  # fmt: skip
         launch(pools_kernel(), model.world_count, [listed.moved, self.rows], device)
         slots = self.super_count * SUPER
-        inputs = [listed.moved, self.columns, model.box, self.supers, listed.order, self.planes]
+        inputs = [listed.moved, self.columns, listed.box, self.supers, listed.order, self.planes]
         launch(halve.supers, slots, inputs, device, SUPER)
         launch(
             partners_kernel(model.precision, model.periodic),
             slots,
-            [listed.moved, model.box, listed.struct, self.columns, self.starts, self.supers,
+            [listed.moved, listed.box, listed.struct, self.columns, self.starts, self.supers,
              self.rows, self.planes, listed.pairs, listed.found, listed.overflow],
             device,
             SUPER,
@@ -183,7 +183,7 @@ class ClusterRows:
         listed, device = self.listed, self.model.device
         block, (grid, places) = listed.blocks[k], self.grids[k]
         precision = self.model.precision
-        launch(lay_kernel(precision), 1, [k, self.model.box, listed.x_listed, self.columns], device)
+        launch(lay_kernel(precision), 1, [k, listed.box, listed.x_listed, self.columns], device)
         inputs = [k, self.columns, listed.x_listed, self.bins, self.places]
         launch(number_kernel(precision), block.count, inputs, device)
         call(functools.partial(grid.build, places, 1.0))

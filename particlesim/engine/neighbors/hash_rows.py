@@ -11,6 +11,7 @@ import warp as wp
 
 from ...kernels.engine.neighbors import renewal as kernels
 from ...kernels.engine.neighbors import rows
+from ...kernels.engine.neighbors.boxes import scaled_cells_kernel
 from ...kernels.warp_internals import grid_shape
 from ..execution.launch import call, launch, when
 from ..model import Model
@@ -95,11 +96,15 @@ class HashRows:
         model, listed, device = self.model, self.listed, self.model.device
         mine = [(listed.blocks[k], *grid) for k, grid in self.grids.items()]
         mine = [each for each in mine if each[0].world == w]
+        boxes = [listed.box] if model.flexible else []
         to_cells = kernels.cell_coordinates_kernel(model.precision)
+        if model.flexible:
+            to_cells = scaled_cells_kernel(model.precision)
         sort = kernels.sorting_kernels(model.precision).sort_slots
         for block, grid, place in mine:
             u = self.cell_coordinate[block.begin : block.end]
-            launch(to_cells, block.count, [place, listed.x_listed, self.cell_coordinate], device)
+            inputs = [place, *boxes, listed.x_listed, self.cell_coordinate]
+            launch(to_cells, block.count, inputs, device)
             call(functools.partial(grid.build, u, 1.0))
             launch(
                 sort,
@@ -108,7 +113,7 @@ class HashRows:
                  self.planes],
                 device,
             )  # fmt: skip
-        make = rows.grid_rows_kernel(model.precision, model.periodic)
+        make = rows.grid_rows_kernel(model.precision, model.periodic, model.flexible)
         for block, _, _ in mine:
             for k, (other, grid, place) in enumerate(mine):
                 thick = listed.skin.first[w]
@@ -117,7 +122,7 @@ class HashRows:
                     make,
                     block.count,
                     [grid.id, place, block.begin, reach / (other.own + thick), int(k > 0),
-                     model.box, reach**2, listed.struct, self.slot, self.planes, listed.pairs,
+                     listed.box, reach**2, listed.struct, self.slot, self.planes, listed.pairs,
                      listed.found, listed.overflow],
                     device,
                 )  # fmt: skip
@@ -129,7 +134,7 @@ class HashRows:
         launch(
             rows.direct_rows_kernel(model.precision, model.periodic),
             listed.count,
-            [self.direct, model.box, listed.moved, listed.struct, self.planes, listed.pairs,
+            [self.direct, listed.box, listed.moved, listed.struct, self.planes, listed.pairs,
              listed.found, listed.overflow],
             model.device,
         )  # fmt: skip

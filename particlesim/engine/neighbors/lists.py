@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
+import warp as wp
 
 from ...scene.part import Interaction
 from ..model import Model
@@ -177,11 +178,14 @@ class Neighbors:
         for each in self.lists:
             each.allocate(state)
 
-    def update(self, state: State) -> None:
-        """Before the interactions: bring their lists up to date."""
+    def update(self, state: State, among: wp.array | None = None) -> None:
+        """Before the interactions: bring their lists up to date.
+
+        ``among``: of worlds where it is not 0 alone; the others are not to be asked then.
+        """
         for each in self.lists:
             if each.for_interactions.any():
-                each.update(state)
+                each.update(state, among=among)
 
     def update_for_constraints(self, state: State) -> None:
         """After integration: bring the constraints' lists up to date."""

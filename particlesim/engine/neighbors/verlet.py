@@ -17,6 +17,7 @@ import warp as wp
 from ... import validate
 from ...kernels.engine.loops import ROWS
 from ...kernels.engine.neighbors import renewal as kernels
+from ...kernels.engine.neighbors.boxes import boxes_kernel, margin_kernel
 from ...kernels.engine.neighbors.clusters import SMALL
 from ...kernels.engine.neighbors.skin import reach_kernel
 from ..execution.launch import call, launch, when
@@ -69,6 +70,10 @@ class VerletList(AllPairs):
             state.require({"time"})
         self.order = wp.clone(self.members)
         self.x_listed = model.array(state["position"].numpy()[members], vec3)
+        self.box = model.box  # that rows are made in
+        if model.flexible:
+            self.box = wp.clone(model.box)
+            self.widest = model.array(self.cutoff, wp.float64)
         self.moved = wp.zeros(model.world_count, dtype=wp.int32, device=device)
         self.any_moved = wp.zeros(1, dtype=wp.int32, device=device)
         self.overflow = wp.zeros(1, dtype=wp.int32, device=device)
@@ -113,7 +118,8 @@ class VerletList(AllPairs):
 
     def persistent(self) -> dict[str, wp.array]:
         """What rows are made from, besides what never changes."""
-        return {"x": self.x_listed, **self.skin.persistent()}
+        boxes = {"box": self.model.numbers(self.box)} if self.model.flexible else {}
+        return {"x": self.x_listed, **boxes, **self.skin.persistent()}
 
     def worlds(self, name: str) -> np.ndarray:
         """The world of each row of one of these."""
@@ -147,20 +153,28 @@ class VerletList(AllPairs):
             self.moved[w : w + 1].fill_(1)
         self.any_moved.fill_(1)
 
-    def update(self, state: State, *, for_constraint: bool = False) -> None:
+    def update(
+        self, state: State, *, for_constraint: bool = False, among: wp.array | None = None
+    ) -> None:
         """Rebuild the rows of worlds in which something moved, and the slot-ordered copies."""
         model, device = self.model, self.model.device
         block = kernels.BLOCK if model.vectorised else 1
-        flag = kernels.moved_kernel(model.precision, model.periodic, block)
+        flag = kernels.moved_kernel(model.precision, model.periodic, model.flexible, block)
+        if model.flexible:
+            inputs = [model.box, self.box, self.widest, self.skin.struct, self.margins_squared]
+            launch(margin_kernel(model.precision), model.world_count, inputs, device)
         launch(
             flag,
             self.count,
-            [self.members, self.world, model.box, self.margins_squared[int(for_constraint)],
-             state.position, self.x_listed, self.moved, self.any_moved],
+            [self.members, self.world, model.box, self.box,
+             self.margins_squared[int(for_constraint)], state.position, self.x_listed,
+             self.moved, self.any_moved],
             device,
             block,
         )  # fmt: skip
         self.skin.flag(state, self.moved, self.any_moved)
+        if among is not None:
+            launch(kernels.among_kernel(), model.world_count, [among, self.moved], device)
         with when(self.any_moved):
             self._take(state)
         self.gather(state, self.names)
@@ -176,12 +190,15 @@ class VerletList(AllPairs):
         """Rows of the worlds marked as moved, from the present positions."""
         model, farthest = self.model, self.skin.struct.farthest_squared
         launch(
-            kernels.positions_kernel(model.precision, model.periodic),
+            kernels.positions_kernel(model.precision, model.periodic, model.flexible),
             self.count,
-            [self.members, self.world, model.box, self.moved, state.position, self.x_listed,
-             farthest],
+            [self.members, self.world, model.box, self.box, self.moved, state.position,
+             self.x_listed, farthest],
             model.device,
         )  # fmt: skip
+        if model.flexible:
+            inputs = [self.moved, model.box, self.box]
+            launch(boxes_kernel(model.precision), model.world_count, inputs, model.device)
         self.skin.choose(state, self.moved)
         self.rebuild()
 
@@ -254,7 +271,7 @@ class VerletList(AllPairs):
         x[members] = self.x_listed.numpy()
         world, order = int(self.world.numpy()[slot]), self.order.numpy()
         d = x[order[others]] - x[order[slot]]
-        length = self.model.box_length[world]
+        length = self.box.numpy()["length"][world].astype(np.float64)
         d -= np.where(length > 0, length * np.round(d / np.where(length > 0, length, 1.0)), 0.0)
         first = self.struct.first.numpy()[world]
         reach = self.blocks[of[slot]].cutoff[of[others] - first] + self.skin.thickness[world]

@@ -17,6 +17,9 @@ from .accounts import Accounts
 class Entry:
     """One interaction, constraint or thermostat, whose work is the heat it gave, since the start.
 
+    A barostat is among the thermostats: its work is what it did to the velocities. What it did to
+    the potential energy is the rest of the change of the energy, that which nobody's heat explains.
+
     work (worlds,) [J]; impulse (worlds, 3) [N s]; angular_impulse about the origin (worlds, 3)
     [N m s]; float64. kind: ``"interaction"``, ``"constraint"`` or
     ``"thermostat"``.

@@ -10,7 +10,7 @@ import numpy as np
 from .limits import ESCAPED, FAST, FINITE
 
 WHAT = {
-    FINITE: "position and velocity must stay finite",
+    FINITE: "position and velocity must stay finite{}",
     ESCAPED: "position must stay within the bounds of the scene and what its numbers resolve, {}",
     FAST: "velocity beyond {} must have a cause that finer substeps agree on",
 }
@@ -37,7 +37,8 @@ class Incident:
     particle counts within the world. frame: how many were good before. start, stop: times of the
     frame [s]. substep: the first after which it was so, of ``of`` substeps, from 1; ``time``: at
     its end [s]. part: the interaction or constraint that did it; None: the motion itself.
-    position, velocity: of the particle after that substep. limit: what it has passed. action:
+    position, velocity: of the particle after that substep. limit: what it has passed, or why the
+    part gave up. action:
     ``"stop"``, ``"retry"`` or ``"freeze"``; substeps: how many the frame was done with in the end.
     """
 
@@ -71,7 +72,9 @@ class Incident:
     def found(self) -> str:
         """What was found, without what was done."""
         kinds = {"not finite": FINITE, "escaped": ESCAPED, "runaway": FAST}
-        what = WHAT[kinds[self.kind]].format(self.limit)
+        kind = kinds[self.kind]
+        why = f" ({self.limit})" if self.limit and kind == FINITE else self.limit
+        what = WHAT[kind].format(why)
         x, v = (np.array2string(np.array(each)) for each in (self.position, self.velocity))
         look = f"look at {self.part}, which did it" if self.part else "look at how fast it moves"
         return (

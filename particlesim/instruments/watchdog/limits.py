@@ -36,7 +36,7 @@ class Limits:
         self.model = model
         worlds, real = model.world_count, model.precision
         self.corners = [_corners(model.scenes, side) for side in (0, 1)]
-        start, _ = model.wrapped(model.column("position"), model.world_of)
+        start, _ = model.wrapped(model.column("position"), model.world_of, model.box_start)
         self._check(start)
         self.radius = self._by_world(np.fmax, model.column("radius"))
         self.resolved = self._resolved(neighbors)

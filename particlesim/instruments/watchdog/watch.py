@@ -130,13 +130,15 @@ class Watchdog:
             part=culprit.part,
             position=_triple(culprit.position),
             velocity=_triple(culprit.velocity),
-            limit=self._limit(culprit),
+            limit=self._limit(loop, culprit),
             action=action,
             substeps=substeps,
         )
 
-    def _limit(self, culprit: Culprit) -> str:
+    def _limit(self, loop: Loop, culprit: Culprit) -> str:
         host, w = self.limits.host, culprit.world
+        if culprit.kind == FINITE:
+            return next((each.fault(w) for each in loop.parts if each.name == culprit.part), "")
         if culprit.kind == ESCAPED:
             lower, upper = (np.array2string(host[name][w]) for name in ("lower", "upper"))
             return f"{lower} to {upper}"

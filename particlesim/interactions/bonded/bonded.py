@@ -49,6 +49,7 @@ class Bonded(Interaction):
     coordinate: Callable[[Precision], wp.Function]  # that a law takes first
     # Others, by what it calls them.
     by_name: Mapping[str, Callable[[Precision], wp.Function]] = MappingProxyType({})
+    follows_box = True
     damped = False  # with -damping dq/dt beside -du/dq; ``items`` gives the damping
 
     def __init__(self, law: Any, tuples: Any, parameters: Mapping[str, Any]):
@@ -136,7 +137,7 @@ class Bonded(Interaction):
             self.size, self.damped, model.precision, model.periodic, Data, Params,
         )  # fmt: skip
         self.force_kernel = kernels.force_kernel(made)
-        self.measure_kernel = kernels.measure_kernel(dataclasses.replace(made, damped=False))
+        self.undamped = dataclasses.replace(made, damped=False)
         rows = kernels.rows_type(self.size)()
         columns = {**self.rows, "world": model.world_of[self.rows["particle"]]}
         for name in ("particle", "world", "begin"):
@@ -150,9 +151,16 @@ class Bonded(Interaction):
             launch(self.force_kernel, self.count, [*self.inputs, state.force], self.model.device)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
+        self._measure(energy, virial, tensor=False)
+
+    def measure_stress(self, state: State, energy: wp.array, stress: wp.array) -> bool:
+        self._measure(energy, stress, tensor=True)
+        return True
+
+    def _measure(self, energy: wp.array, virial: wp.array, tensor: bool) -> None:
         if self.count:
-            inputs = [*self.inputs, energy, virial]
-            launch(self.measure_kernel, self.count, inputs, self.model.device)
+            kernel = kernels.measure_kernel(self.undamped, tensor)
+            launch(kernel, self.count, [*self.inputs, energy, virial], self.model.device)
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By the gradient of the force at the present state."""

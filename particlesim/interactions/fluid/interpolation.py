@@ -11,7 +11,7 @@ from ... import validate
 from ...engine.execution.launch import launch
 from ...engine.neighbors.cells import grid_over
 from ...kernels.engine.neighbors.renewal import cell_coordinates_kernel
-from ...kernels.interactions import sph as kernels
+from ...kernels.interactions.fluid import sph as kernels
 from .sph import SPH
 
 

@@ -16,7 +16,7 @@ from ...engine.neighbors.lists import Neighbors
 from ...engine.neighbors.verlet import VerletList
 from ...engine.probe import Probe
 from ...engine.state import State
-from ...kernels.interactions import sph as kernels
+from ...kernels.interactions.fluid import sph as kernels
 from ...scene.part import Interaction, Part
 from ..pair_loop import PairLoop
 from .equations_of_state import EquationOfState

@@ -13,9 +13,9 @@ from ...engine.easing import Easing
 from ...engine.execution.launch import call, launch, when
 from ...engine.model import Model, filled, structure_of
 from ...engine.state import State
-from ...kernels.interactions import images
-from ...kernels.interactions import walls as kernels
-from ...kernels.interactions.sph import DIRECTIONS, keep_state
+from ...kernels.interactions.fluid import images
+from ...kernels.interactions.fluid import walls as kernels
+from ...kernels.interactions.fluid.sph import DIRECTIONS, keep_state
 from ...scene.group import select
 from ...scene.part import ConstraintBase, Part
 from ..pair_loop import PairLoop
@@ -39,7 +39,7 @@ class Walls:
     """The boundaries that hold particles of a fluid, which see their images in them.
 
     The fluid beyond a wall is its own mirror image (Libersky and Petschek 1991; Morris et al.
-    1997), without particles of its own (see :mod:`particlesim.kernels.interactions.images`).
+    1997), without particles of its own (see :mod:`particlesim.kernels.interactions.fluid.images`).
 
     A side to which a start has placed particles nearer than half a spacing gives way by as much, at
     most by a spacing, and comes back slowly, as overlaps of contacts do: a tank that is no whole

@@ -14,8 +14,8 @@ from ...engine.neighbors.lists import Neighbors
 from ...engine.state import State
 from ...kernels.interactions import thermostat as kernels
 from ...scene.group import select
-from ...scene.part import Thermostat
 from ...scene.scene import Scene
+from ...scene.thermostat import Thermostat
 
 
 class Bath(Thermostat):
@@ -28,7 +28,7 @@ class Bath(Thermostat):
 
     def __init__(self, group: Any, temperature: Any, seed: int):
         self.group = group
-        self.times, self.temperatures = ramp(self.name, temperature)
+        self.times, self.temperatures = ramp(self.name, "temperature", temperature, "energy")
         self.seed = validate.whole(self.name, "seed", seed)
         if self.seed >= 2**64:
             raise validate.fail(self.name, "seed", "be below 2^64", self.seed, "give less")
@@ -39,9 +39,14 @@ class Bath(Thermostat):
         needed = {"velocity", "inverse_mass"}
         if self.model.settings.compensated:
             needed |= {"velocity_error"}
-        if any(len(peer.times) > 1 for peer in self.peers):
+        if any(ramp.knots > 1 for ramp in self.ramps):
             needed |= {"time"}
         return frozenset(needed)
+
+    @property
+    def ramps(self) -> list[Any]:
+        """What may change in time, as kernels take it."""
+        return [self.bath.temperature]
 
     def fastest(self, scene: Scene) -> float:
         mass = scene.mass[select(scene, self.group, self.name)]
@@ -62,13 +67,6 @@ class Bath(Thermostat):
         self.world_host = model.world_of[self.members_host]
         self.members = model.array(self.members_host, wp.int32)
         self.world = model.array(self.world_host, wp.int32)
-        knots = max(len(peer.times) for peer in self.peers)
-        times, values = (
-            np.stack([np.pad(getattr(peer, name), (0, knots - len(peer.times)), "edge")
-                      for peer in self.peers])
-            for name in ("times", "temperatures")
-        )  # fmt: skip
-        model.fits(self.name, {"temperature": values})
         seeds = np.array([peer.seed for peer in self.peers], dtype=np.uint64)
         keys = np.stack([seeds & np.uint64(2**32 - 1), seeds >> np.uint64(32)], axis=1)
         worlds, first = model.world_count, model.scenes[0].thermostats
@@ -76,13 +74,27 @@ class Bath(Thermostat):
         self.bath = kernels.Bath()
         self.bath.key = model.array(keys.astype(np.uint32), wp.vec2ui)
         self.bath.count = self.acted
-        self.bath.times = model.array(times.ravel(), wp.float64)
-        self.bath.values = model.array(values.ravel(), wp.float64)
+        self.bath.temperature = self.ramp("temperature", self.heat())
         self.bath.rate = model.array(self.rates(), wp.float64)
         self.bath.decay = wp.zeros(worlds, dtype=wp.float64, device=model.device)
         self.bath.noise = wp.zeros(worlds, dtype=wp.float64, device=model.device)
-        self.bath.knots = knots
         self.bath.place = next(k for k, each in enumerate(first) if each is self.peers[0])
+
+    def heat(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Times and temperatures of each world."""
+        return [(peer.times, peer.temperatures) for peer in self.peers]
+
+    def ramp(self, what: str, ramps: Sequence[tuple[np.ndarray, np.ndarray]]) -> Any:
+        """Times and values of each world as kernels take them."""
+        most = max(len(times) for times, _ in ramps)
+        padded = [[np.pad(each, (0, most - len(each)), "edge") for each in one] for one in ramps]
+        times, values = (np.concatenate(each) for each in zip(*padded, strict=True))
+        self.model.fits(self.name, {what: values})
+        result = kernels.Ramp()
+        result.times = self.model.array(times, wp.float64)
+        result.values = self.model.array(values, wp.float64)
+        result.knots = most
+        return result
 
     def attach(self, model: Model, state: State) -> None:
         self.time = state.time if "time" in self.requires else None
@@ -98,21 +110,23 @@ class Bath(Thermostat):
         self.forget(self.persistent(), worlds)
 
 
-def ramp(owner: str, temperature: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Times and temperatures of a number, or of a pair (times, temperatures)."""
-    if not isinstance(temperature, tuple | list) and np.ndim(temperature) == 0:
-        value = validate.number(owner, "temperature", temperature, minimum=0.0, unit="energy")
+def ramp(
+    owner: str, name: str, given: Any, unit: str, minimum: float | None = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values of a number, or of a pair (times, values)."""
+    if not isinstance(given, tuple | list) and np.ndim(given) == 0:
+        value = validate.number(owner, name, given, minimum=minimum, unit=unit)
         return np.zeros(1), np.array([value])
-    if len(temperature) != 2 or not 1 <= np.size(temperature[0]) == np.size(temperature[1]):
+    if len(given) != 2 or not 1 <= np.size(given[0]) == np.size(given[1]):
         raise validate.fail(
-            owner, "temperature", "be a number or (times, temperatures) of one length",
-            temperature, "give as many temperatures as times",
+            owner, name, f"be a number or (times, {name}s) of one length", given,
+            f"give as many {name}s as times",
         )  # fmt: skip
-    times = validate.rows(owner, "temperature times", temperature[0], np.size(temperature[0]), None)
-    values = validate.rows(owner, "temperature", temperature[1], len(times), None)
+    times = validate.rows(owner, f"{name} times", given[0], np.size(given[0]), None)
+    values = validate.rows(owner, name, given[1], len(times), None)
     if (np.diff(times) <= 0).any():
-        raise validate.fail(owner, "temperature times", "rise", times.tolist(), "sort them")
-    if (values < 0).any():
+        raise validate.fail(owner, f"{name} times", "rise", times.tolist(), "sort them")
+    if minimum is not None and (values < minimum).any():
         worst = float(values.min())
-        raise validate.fail(owner, "temperature", "be at least 0", worst, "give energies, k_B T")
+        raise validate.fail(owner, name, f"be at least {minimum:g} [{unit}]", worst, "give more")
     return times, values

@@ -67,6 +67,16 @@ def pressure(record: Record) -> Panel:
     return Panel("pressure", "energy / length³", _family(record, "pressure"))
 
 
+def volume(record: Record) -> Panel:
+    """Of a box that a barostat scales."""
+    return Panel("volume", "length³", _family(record, "volume"))
+
+
+def stress(record: Record) -> Panel:
+    """Of a periodic box, as a pressure."""
+    return Panel("stress", "energy / length³", _family(record, "stress_"))
+
+
 def observed(record: Record) -> Panel:
     """What the run was asked to observe."""
     return Panel("observed", "", _family(record, "observed:"))
@@ -88,8 +98,8 @@ def residual(record: Record) -> Panel:
 PANELS: dict[str, Callable[[Record], Panel]] = {
     each.__name__: each
     for each in (
-        energy, drift, momentum, angular_momentum, potential, temperature, pressure, density,
-        residual, observed,
+        energy, drift, momentum, angular_momentum, potential, temperature, pressure, stress,
+        volume, density, residual, observed,
     )
 }  # fmt: skip
 

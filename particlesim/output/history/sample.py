@@ -12,6 +12,7 @@ from ...engine.loop import Source
 from ...instruments.diagnostics import measure, undisturbed
 from ...instruments.residuals import residuals
 from ...interactions.fluid.sph import SPH
+from ...kernels.tensor import AXES
 
 Observed = Mapping[str, Callable[[Any], Any]]
 
@@ -26,8 +27,12 @@ def sample(sim: Source, observe: Observed | None = None) -> dict[str, np.ndarray
             vectors = getattr(total, name)
             values |= {f"{name}_{axis}": vectors[:, k] for k, axis in enumerate("xyz")}
         names = ["kinetic", "potential", "energy", "temperature"]
-        names += ["pressure"] if np.isfinite(total.volume).all() else []
+        boxed = bool(np.isfinite(total.volume).all())
+        names += ["pressure"] if boxed else []
+        names += ["volume"] if sim.model.flexible else []
         values |= {name: getattr(total, name) for name in names}
+        for a, b in AXES if boxed else ():
+            values[f"stress_{'xyz'[a]}{'xyz'[b]}"] = total.stress[:, a, b]
         for label, part, own in zip(
             _labels(sim.interactions), sim.interactions, potentials, strict=True
         ):

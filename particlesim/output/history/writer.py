@@ -33,10 +33,11 @@ class History(files.Closing):
     """Records what a simulation did, frame by frame.
 
     Columns: ``mass``, ``momentum_x``, ``angular_momentum_x`` (and y, z), ``kinetic``,
-    ``potential``, ``energy``, ``temperature``, in a periodic box ``pressure`` (see
-    ``Simulation.diagnostics``); ``potential:<interaction>`` of each that has one;
-    ``density_error_max:<fluid>`` and ``density_error_rms:<fluid>`` of rho / rho0 - 1, where there
-    is a rest density; ``residual_max:<constraint>`` and ``residual_rms:<constraint>`` (see
+    ``potential``, ``energy``, ``temperature``, in a periodic box ``pressure`` and ``stress_xx``
+    (and yy, zz, yz, xz, xy; see ``Simulation.diagnostics``), with a barostat ``volume``;
+    ``potential:<interaction>`` of each that has one; ``density_error_max:<fluid>`` and
+    ``density_error_rms:<fluid>`` of rho / rho0 - 1, where there is a rest density;
+    ``residual_max:<constraint>`` and ``residual_rms:<constraint>`` (see
     :mod:`particlesim.instruments.residuals`); ``observed:<name>`` of what is observed. A run with
     a history goes as one without, bit for bit.
 

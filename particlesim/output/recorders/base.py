@@ -13,6 +13,7 @@ import numpy as np
 
 from ... import validate
 from ...engine.loop import Source
+from ...engine.state import OF_WORLDS
 from .. import files
 from ..fields import ParticleFields
 from ..lock import Lock
@@ -137,11 +138,13 @@ class ParticleFrame:
         columns: ``position`` and ``velocity`` (n, 3), ``radius`` (n,), in the precision of the
             simulation; ``id`` (place in the world's scene), ``group`` (place among the names) and
             ``world``, (n,) int32; and the chosen fields, (n,) or (n, 3).
+        boxes: Lengths of the worlds' periodic boxes, (worlds, 3); 0 on open axes.
     """
 
     number: int
     time: float
     columns: dict[str, np.ndarray]
+    boxes: np.ndarray
 
 
 class ParticleRecorder(Recorder):
@@ -174,7 +177,7 @@ class ParticleRecorder(Recorder):
     ):  # fmt: skip
         super().__init__(sim, path, frames, fields, every)
         for name in self.fields.names:
-            if name in COLUMNS or name == "time":
+            if name in COLUMNS or name in OF_WORLDS:
                 raise validate.fail(
                     self.owner, "fields", "have other names than what every frame has", name,
                     "leave it out",
@@ -198,7 +201,8 @@ class ParticleRecorder(Recorder):
             **self._constant,
             **self.fields.read(),
         }
-        return ParticleFrame(sim.frame // self.every, sim.time, columns)
+        boxes = sim.model.box_length.copy()
+        return ParticleFrame(sim.frame // self.every, sim.time, columns, boxes)
 
     def _write(self, frame: ParticleFrame) -> None:
         if self._closed or (self.last is not None and frame.number != self.last + 1):

@@ -33,9 +33,10 @@ class GsdRecorder(ParticleRecorder):
 
     Positions, velocities, groups (as types), masses, diameters and images are where the HOOMD
     schema has them; ``log/particles/id``, ``/world`` and the fields beside, and ``log/time``. The
-    box is the periodic one; on an open axis it is as long as twice the frame's positions reach, so
-    that nobody is outside. Positions stay as they are: HOOMD's box is around the origin, so that in
-    a periodic one they may lie an image away; unwrapped, position + image * box, they are right.
+    box is the periodic one of the frame; on an open axis it is as long as twice the frame's
+    positions reach, so that nobody is outside. Positions stay as they are: HOOMD's box is around
+    the origin, so that in a periodic one they may lie an image away; unwrapped, position + image *
+    box, they are right.
 
     A frame is appended at the end, and its data come before what leads to them. When the process
     is killed, the frames whose write had returned can be read. A kill may leave a part of the next
@@ -124,7 +125,7 @@ class GsdRecorder(ParticleRecorder):
     def _frame(self, frame: ParticleFrame) -> Any:
         made, columns = self._library.Frame(), frame.columns
         made.configuration.step = frame.number * self.every
-        made.configuration.box = self._box(columns["position"])
+        made.configuration.box = _box(frame.boxes, columns["position"])
         particles = made.particles
         particles.N = len(columns["position"])
         particles.types = self.group_names
@@ -153,14 +154,15 @@ class GsdRecorder(ParticleRecorder):
         ]
         return all(np.array_equal(np.asarray(a), np.asarray(b)) for a, b in pairs)
 
-    def _box(self, x: np.ndarray) -> list[float]:
-        """Lengths of the box, and no tilts; those of open axes hold all of x."""
-        length = self.sim.model.box_length.max(axis=0)
-        reach = 2.0 * np.abs(x).max(axis=0, initial=0.0)
-        single = reach.astype(np.float32)  # as it is written
-        reach = np.where(single < reach, np.nextafter(single, np.float32(np.inf)), single)
-        open_length = np.where(reach > 0, reach, 1.0)
-        return [*np.where(length > 0, length, open_length).tolist(), 0.0, 0.0, 0.0]
+
+def _box(boxes: np.ndarray, x: np.ndarray) -> list[float]:
+    """Lengths of the largest box, and no tilts; those of open axes hold all of x."""
+    length = boxes.max(axis=0)
+    reach = 2.0 * np.abs(x).max(axis=0, initial=0.0)
+    single = reach.astype(np.float32)  # as it is written
+    reach = np.where(single < reach, np.nextafter(single, np.float32(np.inf)), single)
+    open_length = np.where(reach > 0, reach, 1.0)
+    return [*np.where(length > 0, length, open_length).tolist(), 0.0, 0.0, 0.0]
 
 
 # The layout ------------------------------------------------------------------------------------

@@ -16,10 +16,11 @@ class NpzRecorder(FolderRecorder):
     """Records frames as NumPy archives, in the precision of the simulation, bit for bit.
 
     A frame ``out.frames/f.######.npz`` holds ``frame``, ``time`` and the columns of
-    :class:`.ParticleFrame`. ``out.npz`` says what there is: ``first`` and ``last`` frame, ``dt``
-    between them, the names of ``groups`` and ``fields``, and the ``pattern`` of the frames' paths,
-    from the folder of ``out.npz``. Until the recording is closed ``last`` is the planned one;
-    frames are whole or not there.
+    :class:`.ParticleFrame`, and with a barostat ``box``, the lengths of the boxes, (worlds, 3).
+    ``out.npz`` says what there is: ``first`` and ``last`` frame, ``dt`` between them, the names of
+    ``groups`` and ``fields``, and the ``pattern`` of the frames' paths, from the folder of
+    ``out.npz``. Until the recording is closed ``last`` is the planned one; frames are whole or not
+    there.
 
     Arguments are those of :class:`~particlesim.output.recorders.base.ParticleRecorder`.
 
@@ -51,6 +52,8 @@ class NpzRecorder(FolderRecorder):
 
     def _save(self, path: Path, frame: ParticleFrame) -> None:
         alone: dict[str, Any] = {"frame": np.int64(frame.number), "time": np.float64(frame.time)}
+        if self.sim.model.flexible:
+            alone["box"] = frame.boxes
         files.write_arrays(path, {**alone, **frame.columns})
 
     @property

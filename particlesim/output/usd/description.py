@@ -150,6 +150,7 @@ class StageInfo:
         meters_per_unit: Length of one unit [m].
         periodic: ``(lower, upper)`` corners of a periodic box [length], drawn as an outline; links
             then take the short way. None or NaN on an axis leaves it open.
+        flexible: Whether its upper corner moves, and frames say where it is.
 
     Raises:
         ValueError: A value out of range, ``up_axis="x"`` (USD knows Y and Z only), nothing to draw.
@@ -166,6 +167,7 @@ class StageInfo:
     up_axis: str = "y"
     meters_per_unit: float = 1.0
     periodic: Any = None
+    flexible: bool = False
 
     def __post_init__(self) -> None:
         owner = "StageInfo"

@@ -100,7 +100,12 @@ class Drawing:
             up_axis=first.up_axis,
             meters_per_unit=first.meters_per_unit,
             periodic=periodic_box(sim),
+            flexible=sim.model.flexible and periodic_box(sim) is not None,
         )
+
+    def box(self) -> np.ndarray | None:
+        """Lengths of the periodic box now, where it changes."""
+        return self.sim.model.box_length[0] if self.info.flexible else None
 
     def pairs(self) -> dict[LinksPrim, np.ndarray]:
         """The links that are whole now, of constraints that break."""

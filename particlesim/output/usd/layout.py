@@ -62,6 +62,12 @@ def layout(info: StageInfo) -> Layout:
     )
 
 
+def outlines(info: StageInfo) -> list[Sdf.Path]:
+    """Paths of the outlines of the periodic box: one, or one a world where they are laid out."""
+    places = [room(world) for world in info.worlds] if info.layout else [WORLD]
+    return [place.AppendChild(PERIODIC_BOX) for place in places]
+
+
 def is_boundary(prim: Usd.Prim) -> bool:
     """Whether a prim is what a recording draws of a boundary."""
     return f"/{BOUNDARIES}/" in str(prim.GetPath())

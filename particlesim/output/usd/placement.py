@@ -60,8 +60,10 @@ def _reach(scene: Scene) -> np.ndarray:
 
 
 def periodic_box(sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
-    """The box, where all worlds have the same."""
-    length, lower = sim.model.box_length, sim.model.box_lower
+    """The box at the start, where all worlds have the same and keep it so."""
+    length, lower = sim.model.box_start, sim.model.box_lower
+    if sim.model.flexible and sim.model.world_count > 1:
+        return None
     if not sim.model.periodic or np.ptp(length, axis=0).any() or np.ptp(lower, axis=0).any():
         return None
     on = length[0] > 0

@@ -117,6 +117,7 @@ class UsdRecorder(Recorder):
             "pairs": self.drawing.pairs(),
             "meshes": self.drawing.meshes(),
             "poses": self.drawing.poses(),
+            "box": self.drawing.box(),
         }
         if self.colors is not None:
             fields["displayColor"] = self.colors.read()

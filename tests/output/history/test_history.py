@@ -47,6 +47,9 @@ def test_what_is_observed_is_recorded(tmp_path, refused):
     assert record["observed:g 1"].shape == (5, 2)
     np.testing.assert_allclose(record["temperature"], 25 / 6, rtol=1e-14)
     np.testing.assert_allclose(record["pressure"], 25 / 24, rtol=1e-14)
+    np.testing.assert_allclose(record["stress_xx"], 9 / 8, rtol=1e-14)
+    np.testing.assert_allclose(record["stress_yy"], 16 / 8, rtol=1e-14)
+    np.testing.assert_array_equal(record["stress_yz"], 0)
     with refused(r"observe\['one'\] must give one value a world, \(2,\), got"):
         History(sim, tmp_path / "other.csv", observe={"one": lambda sim: 1.0}).write()
 

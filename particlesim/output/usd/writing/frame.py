@@ -61,6 +61,7 @@ class Frame:
     surfaces: list[Surface]
     poses: list[np.ndarray | None]  # (4, 4), a point in a row times the pose
     notes: dict[str, Any]
+    box: np.ndarray | None  # lengths of a box that changes, (3,)
 
     def widths(self, prim: PointsPrim, rows: Any) -> np.ndarray | float | None:
         """Diameters of a group: the frame's own, or those of the description."""
@@ -116,6 +117,7 @@ class FrameChecker:
         meshes: Mapping[MeshPrim, tuple[Any, Any, Any]] | None,
         poses: Mapping[Shape, tuple[Any, Any]] | None,
         notes: Mapping[str, Any] | None,
+        box: Any,
     ) -> Frame:
         """The frame of these values (see ``UsdWriter.write``)."""
         info = self.info
@@ -147,7 +149,9 @@ class FrameChecker:
             for shape, found in _paired(
                 "poses", info.shapes, [shape.moving for shape in info.shapes], poses)
         ]  # fmt: skip
-        return Frame(number, x, v, values, clouds, links, surfaces, matrices, dict(notes or {}))
+        sides = validate.vector(OWNER, "box", box) if info.flexible else None
+        notes = dict(notes or {})
+        return Frame(number, x, v, values, clouds, links, surfaces, matrices, notes, sides)
 
     def _array(
         self, name: str, given: Any, kind: int | str, number: int, needed: int, scale: float = 1.0

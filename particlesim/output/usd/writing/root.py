@@ -21,7 +21,7 @@ import numpy as np
 from pxr import Sdf, Vt
 
 from ..description import Color, LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
-from ..layout import PERIODIC_BOX, WORLD, Layout, room
+from ..layout import WORLD, Layout, outlines, room
 from .frame import Frame
 from .geometry import (
     CORNERS,
@@ -163,23 +163,24 @@ class _Root:
         if prim.triangles is not None:
             polygons(spec, prim.triangles)
 
-    def outline(self, path: Sdf.Path, box: np.ndarray, color: Color) -> None:
+    def outline(self, path: Sdf.Path, box: np.ndarray, color: Color) -> Sdf.PrimSpec:
         """The edges of a box."""
         spec = self.materials.gprim(path, "BasisCurves", "outline", color)
         points = (box[0] + CORNERS * (box[1] - box[0]))[np.ravel(EDGES)]
         width = 0.002 * self.diagonal
         straight(spec, len(EDGES), width)
         still(spec, points, width)
+        return spec
 
     def periodic_boxes(self) -> None:
         """One outline, or one a world where they are laid out."""
         # On an open axis the outline is as long as what there is to see.
-        places = {WORLD: self.box}
-        if self.info.layout:
-            places = {room(world): box for world, box in self.boxes.items()}
-        for parent, seen in places.items():
+        every = self.boxes.values() if self.info.layout else [self.box]
+        for path, seen in zip(outlines(self.info), every, strict=True):
             box = np.where(np.isnan(self.info.periodic), seen, self.info.periodic)
-            self.outline(parent.AppendChild(PERIODIC_BOX), box, (0.5, 0.5, 0.5))
+            spec = self.outline(path, box, (0.5, 0.5, 0.5))
+            if self.info.flexible:
+                place(spec, None)
 
     def shape(self, shape: Shape, path: Sdf.Path, pose: np.ndarray | None) -> None:
         first, second = shape.parameters

@@ -13,7 +13,7 @@ import numpy as np
 from pxr import Sdf, Vt
 
 from ..description import LinksPrim, MeshPrim, PointsPrim, StageInfo
-from ..layout import Layout
+from ..layout import Layout, outlines
 from .frame import KINDS, Frame, Surface, primvar
 from .geometry import extent
 from .prims import Types, author, floats, integers, matrix, vectors
@@ -35,6 +35,8 @@ def manifest(paths: Layout, fields: Fields, info: StageInfo) -> Sdf.Layer:
         for shape, path in zip(info.shapes, paths.shapes, strict=True):
             if shape.moving:
                 author(Sdf.CreatePrimInLayer(layer, path), "xformOp:transform", Types.Matrix4d)
+        for path in outlines(info) if info.flexible else ():
+            author(Sdf.CreatePrimInLayer(layer, path), "xformOp:transform", Types.Matrix4d)
     return layer
 
 
@@ -97,12 +99,23 @@ def fill_clip(clip: Sdf.Layer, paths: Layout, info: StageInfo, frame: Frame) -> 
         for prim, path, (rows, ids) in zip(info.points, paths.points, frame.clouds, strict=True):
             put(path, _points(prim, frame, rows, ids))
         for links, path, pairs in zip(info.links, paths.links, frame.pairs, strict=True):
-            put(path, _links(links, info, frame.x, pairs))
+            put(path, _links(links, info, frame, pairs))
         for path, surface in zip(paths.meshes, frame.surfaces, strict=True):
             put(path, _mesh(frame, surface))
         for path, pose in zip(paths.shapes, frame.poses, strict=True):
             if pose is not None:
                 put(path, iter([("xformOp:transform", matrix(pose))]))
+        for path in outlines(info) if info.flexible else ():
+            put(path, iter([("xformOp:transform", matrix(_stretch(info, frame)))]))
+
+
+def _stretch(info: StageInfo, frame: Frame) -> np.ndarray:
+    """What takes the outline of the box at the start to that of the frame, (4, 4)."""
+    lower, upper = info.periodic
+    ratio = np.asarray(frame.box) / (upper - lower)
+    pose = np.diag([*ratio, 1.0])
+    pose[3, :3] = lower * (1.0 - ratio)
+    return pose
 
 
 def _points(
@@ -126,20 +139,20 @@ def _points(
 
 
 def _links(
-    prim: LinksPrim, info: StageInfo, x: np.ndarray, pairs: np.ndarray
+    prim: LinksPrim, info: StageInfo, frame: Frame, pairs: np.ndarray
 ) -> Iterator[tuple[str, Any]]:
-    points = _segments(pairs, info, x)
+    points = _segments(pairs, info, frame)
     yield "points", vectors(points)
     yield "extent", vectors(extent(points, prim.width))
     if prim.pairs is None:
         yield "curveVertexCounts", integers(np.full(len(pairs), 2))
 
 
-def _segments(pairs: np.ndarray, info: StageInfo, x: np.ndarray) -> np.ndarray:
+def _segments(pairs: np.ndarray, info: StageInfo, frame: Frame) -> np.ndarray:
     """Ends of the links, (2 m, 3); in a periodic box the second is its image next to the first."""
-    ends = x[pairs]
+    ends = frame.x[pairs]
     if info.periodic is not None:
-        size = info.periodic[1] - info.periodic[0]
+        size = info.periodic[1] - info.periodic[0] if frame.box is None else frame.box
         around = ~np.isnan(size)
         apart = (ends[:, 1] - ends[:, 0])[:, around]
         ends[:, 1, around] -= np.round(apart / size[around]) * size[around]

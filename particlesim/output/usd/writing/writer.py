@@ -111,6 +111,7 @@ class UsdWriter(files.Closing):
         meshes: Mapping[MeshPrim, tuple[Any, Any, Any]] | None = None,
         poses: Mapping[Shape, tuple[Any, Any]] | None = None,
         notes: Mapping[str, Any] | None = None,
+        box: Any = None,
     ) -> None:
         """Write one frame. When it returns, the frame is in its file, whole.
 
@@ -125,6 +126,7 @@ class UsdWriter(files.Closing):
                 into them, counterclockwise from outside, and normals (p, 3).
             poses: Of every moving shape: translation (3,) [length] and rotation (3, 3).
             notes: Words and numbers to keep in the frame's file, as layer data ``particlesim``.
+            box: Of a flexible periodic box its lengths, (3,) [length].
 
         Raises:
             ValueError: A frame out of order, arrays of other shapes, values that are missing, or a
@@ -142,7 +144,7 @@ class UsdWriter(files.Closing):
                 owner, "frame", f"be {self._frame + 1}, the next", frame, "leave no frame out"
             )
         checked = self._checker.frame(
-            frame, position, velocity, fields, rows, pairs, meshes, poses, notes
+            frame, position, velocity, fields, rows, pairs, meshes, poses, notes, box
         )
         if self._clip is None:
             self._begin(checked)

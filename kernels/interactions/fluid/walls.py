@@ -5,11 +5,11 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
-from ..constraints.rigid_motion import frame_functions, pose_type
-from ..engine.atomics import rise_function
-from ..engine.easing import ease_function, easing_type
-from ..engine.loops import Pairs
-from ..precision import Precision, function, register, structure
+from ...constraints.rigid_motion import frame_functions, pose_type
+from ...engine.atomics import rise_function
+from ...engine.easing import ease_function, easing_type
+from ...engine.loops import Pairs
+from ...precision import Precision, function, register, structure
 
 FAR = 100.0  # times the reach: where no wall is
 

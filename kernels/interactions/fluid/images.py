@@ -25,10 +25,10 @@ from typing import Any
 
 import warp as wp
 
-from ..engine.loops import Pairs, Periodicity, Term, box_type, reader
-from ..engine.packed import FLAGS
-from ..precision import Precision, function, function_from_source, register
-from .pair import sums_over_partners
+from ...engine.loops import Pairs, Periodicity, Term, box_type, reader
+from ...engine.packed import FLAGS
+from ...precision import Precision, function, function_from_source, register
+from ..pair import sums_over_partners
 from .walls import near_type
 
 Sticky = tuple[bool, ...] | None

@@ -16,9 +16,9 @@ from typing import Any
 
 import warp as wp
 
-from ..engine.loops import Periodicity, Term, box_type, minimum_image, reader
-from ..precision import Precision, function, function_from_source, register
-from ..warp_internals import arguments as arguments_of
+from ...engine.loops import Periodicity, Term, box_type, minimum_image, reader
+from ...precision import Precision, function, function_from_source, register
+from ...warp_internals import arguments as arguments_of
 
 # Where coincident particles are pushed along, within the line or plane of a lower dimension.
 DIRECTIONS = {1: (1.0, 0.0, 0.0), 2: (0.6, 0.8, 0.0), 3: (0.48, 0.6, 0.64)}

@@ -1,0 +1,1 @@
+"""Fluids: terms of their pairs, what is kept of their sums, and walls."""
