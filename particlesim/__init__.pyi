@@ -35,7 +35,13 @@ from .interactions.electrostatics.electrostatics import Electrostatics
 from .interactions.fields.field_force import FieldForce
 from .interactions.fields.poisson import PoissonField
 from .interactions.fields.wave import GridField
-from .interactions.fluid.equations_of_state import EquationOfState, Polytrope, Tait
+from .interactions.fluid.equations_of_state import (
+    EquationOfState,
+    IdealGas,
+    Isothermal,
+    Polytrope,
+    Tait,
+)
 from .interactions.fluid.sph import SPH
 from .interactions.fluid.viscosities import ArtificialViscosity, Viscosity
 from .interactions.grains import HertzianGrains
@@ -91,9 +97,11 @@ __all__ = [
     "HarmonicBonds",
     "HertzianGrains",
     "History",
+    "IdealGas",
     "Incident",
     "Integrator",
     "Interaction",
+    "Isothermal",
     "Langevin",
     "Law",
     "Ledger",

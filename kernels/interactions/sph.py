@@ -48,12 +48,12 @@ def density_term(weight: wp.Function, precision: Precision, data: Any, params: A
 
 @functools.cache
 def keep_state(
-    weight: wp.Function, pressure: wp.Function, sound_speed: wp.Function | None,
+    weight: wp.Function, pressure: wp.Function, sound_speed: wp.Function | None, hot: bool,
     precision: Precision, data: Any, params: Any, out: Any,
 ) -> wp.Function:  # fmt: skip
     """Store: density and pressure of the particle, and (m, rho, P/rho^2, c) in slot order.
 
-    ``sound_speed`` None leaves c at 0.
+    ``sound_speed`` None leaves c at 0; ``hot``: the data hold internal energies u.
     """
     real, one, vec4 = precision.scalar, precision.vector(1), precision.vector(4)
     sounds = sound_speed is not None
@@ -61,10 +61,13 @@ def keep_state(
     def keep(i: int, particle: int, total: one, d: data, p: params, o: out):
         m = d.m[i]
         rho = p.sigma * (total[0] + m * weight(real(0.0)))  # the sum is over the others
-        pressure_i = pressure(rho, p)
+        u = real(0.0)
+        if wp.static(hot):
+            u = d.u[i]
+        pressure_i = pressure(rho, u, p)
         c = real(0.0)
         if wp.static(sounds):
-            c = sound_speed(rho, pressure_i, p)
+            c = sound_speed(rho, u, pressure_i, p)
         o.state[i] = vec4(m, rho, pressure_i / (rho * rho), c)
         o.rho[particle] = rho
         o.pressure[particle] = pressure_i
@@ -129,13 +132,16 @@ def add_force(precision: Precision, data: Any, params: Any, out: Any) -> wp.Func
 
 @functools.cache
 def keep_measure(
-    energy: wp.Function, precision: Precision, data: Any, params: Any, out: Any
+    energy: wp.Function, hot: bool, precision: Precision, data: Any, params: Any, out: Any
 ) -> wp.Function:
-    """Store: the particle's energy m u(rho) and its share of the virial."""
-    one = precision.vector(1)
+    """Store: the particle's energy m u and its share of the virial."""
+    real, one = precision.scalar, precision.vector(1)
 
     def keep(i: int, particle: int, total: one, d: data, p: params, o: out):
-        u = energy(d.state[i][1], p)
+        u = real(0.0)
+        if wp.static(hot):
+            u = d.u[i]
+        u = energy(d.state[i][1], u, p)
         o.energy[particle] = o.energy[particle] + wp.float64(d.m[i] * u)
         o.virial[particle] = o.virial[particle] + wp.float64(total[0])
 

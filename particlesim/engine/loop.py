@@ -90,18 +90,24 @@ class Loop:
         """Advance by ``dt``: interactions, integration, constraints, velocities."""
         self.observers.begin(dt)
         act(self.integrator, self.integrator.begin, dt)
+        if self.integrator.carries_forces:
+            self._go_on("begin", dt)
         self.forces(dt)
         self.follow(dt)
         act(self.integrator, self.integrator.advance, dt)
-        for interaction in self.moving:
-            with owner(interaction.name):
-                act(interaction, interaction.advance, self.state, dt)
+        self._go_on("advance", dt)
         self.constrain(dt, self.settings.iterations)
         act(self.integrator, self.integrator.finish, dt)
         now = self.state, self.neighbors, dt
         for constraint in self.constraints:
             self.observers.act(constraint, FINISH, constraint.finish, *now)
         self.observers.end(dt)
+
+    def _go_on(self, step: str, dt: float) -> None:
+        """What interactions have of their own goes on."""
+        for interaction in self.moving:
+            with owner(interaction.name):
+                act(interaction, getattr(interaction, step), self.state, dt)
 
     def exchange(self, dt: float) -> None:
         """Thermostats change velocities, in the middle of a drift of ``dt``."""
@@ -170,11 +176,13 @@ class Loop:
         left = []
         if known:
             found = [self.state.held(name) for name in LEFT_BY_FORCES if name in self.state]
-            left = [*found, *self.observers.carried()]
+            own = [array for part in self.interactions for array in part.carried()]
+            left = [*found, *own, *self.observers.carried()]
         before = [each.numpy().copy() for each in left]
         self.forces(self.settings.substep)
         if self.neighbors.grow():
             self.forces(self.settings.substep)
+        self._go_on("carry", self.settings.substep)
         keep = np.isin(self.model.world_of, list(known))
         for each, old in zip(left, before, strict=True):
             # Forces that depend on velocity would not come out as they were within the step.

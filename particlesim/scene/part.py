@@ -26,6 +26,7 @@ class Part:
 
     requires: frozenset[str] = frozenset()
     host: bool = False
+    evolves: frozenset[str] = frozenset()  # attributes of the particles that it changes in time
     group: Any = None
     peers: Sequence[Any]
     model: Any  # once prepared
@@ -171,11 +172,18 @@ class Interaction(Part):
         """Add forces."""
         raise validate.undefined(self, "apply(self, state, neighbors, dt)")
 
-    def advance(self, state: Any, dt: float) -> None:
-        """What it has of its own goes on, as the particles have: a field, once in a substep.
+    def begin(self, state: Any, dt: float) -> None:
+        """Before the forces of velocity Verlet: its own comes to where it is foreseen to end."""
 
-        ``apply`` may be called at any time, and leaves that as it is.
-        """
+    def advance(self, state: Any, dt: float) -> None:
+        """Its own goes on, as of a field, once in a substep; ``apply`` leaves that as it is."""
+
+    def carry(self, state: Any, dt: float) -> None:
+        """After forces outside a substep: what the next one of ``dt`` begins with."""
+
+    def carried(self) -> list[Any]:
+        """The arrays that ``carry`` writes, a row for each particle."""
+        return []
 
     def follow(self, state: Any, damps: bool) -> None:
         """Add (df/dv) u, by which the force differs where the velocity is u ahead.

@@ -16,9 +16,10 @@ from ...engine.neighbors.verlet import VerletList
 from ...engine.probe import Probe
 from ...engine.state import State
 from ...kernels.interactions import sph as kernels
-from ...scene.part import Interaction
+from ...kernels.interactions.heat import heat_term
 from ..pair_loop import PairLoop
 from .equations_of_state import EquationOfState
+from .heat import ENERGY, Heat, Heated, check_energies
 from .limits import fluid_limits
 from .smoothing import SMOOTHING, SUPPORT
 from .starts import complaint
@@ -26,16 +27,16 @@ from .viscosities import Viscosity
 
 # What laws may name beside smoothing_length, rest_density and the parameters of their part.
 VARIABLES = {
-    "pressure": ("density",),
-    "energy": ("density",),
-    "sound_speed": ("density", "pressure"),
+    "pressure": ("density", "internal_energy"),
+    "energy": ("density", "internal_energy"),
+    "sound_speed": ("density", "internal_energy", "pressure"),
     "term": ("approach", "distance_squared", "density", "sound_speed"),
 }
 COINCIDENT = 1e-6  # closer than this, in parts of h, particles count as coincident
 
 
-class SPH(Interaction):
-    r"""A barotropic fluid: density by summation, symmetric pressure force, viscosity.
+class SPH(Heated):
+    r"""A fluid: density by summation, symmetric pressure force, viscosity.
 
         rho_i = sum_j m_j W_ij                    (over all j within 2 h, i itself included)
         F_ij = -m_i m_j (P_i/rho_i^2 + P_j/rho_j^2 + Pi_ij) grad_i W_ij
@@ -43,7 +44,8 @@ class SPH(Interaction):
     with W_ij = W(|x_i - x_j|, h) (Gingold and Monaghan 1977; Monaghan 1992, eq. 3.3). The pressure
     force is the exact gradient of the energy sum_i m_i u(rho_i), so that momentum and angular
     momentum are conserved to round-off and the energy to the integrator's order; viscosity takes
-    energy out. Coincident particles are pushed apart, equally and opposite.
+    energy out, or turns it into heat (:class:`~particlesim.IdealGas`). Coincident particles are
+    pushed apart, equally and opposite.
 
     The step is bounded by the time of sound across a smoothing length and by the acceleration
     (Monaghan 1992, on time stepping): dt < 0.4 h / (c (1 + 0.6 alpha)) and dt < 0.25 sqrt(h / |a|).
@@ -120,6 +122,9 @@ class SPH(Interaction):
         self._take("state", equation_of_state)
         if viscosity is not None:
             self._take("viscosity", viscosity)
+        self.hot = any(ENERGY in law.parameters for law in equation_of_state.laws.values())
+        if self.hot:
+            self.keep_heat()
 
     def _take(self, prefix: str, part: EquationOfState | Viscosity) -> None:
         """Note what fills the arguments of a part's laws; its parameters join the fluid's."""
@@ -146,9 +151,12 @@ class SPH(Interaction):
         self.model = model
         columns = self.columns(self.parameters)
         h = columns["smoothing_length"]
-        pairs = neighbors.of(self, {"mass"} | ({"velocity"} if self.viscosity else set()))
+        read = {"velocity": self.viscosity is not None, ENERGY: self.hot}
+        pairs = neighbors.of(self, {"mass"} | {name for name, on in read.items() if on})
         assert isinstance(pairs, VerletList)  # as there is a cutoff
         self.pairs = pairs
+        if self.hot:
+            check_energies(self.name, model, pairs.members_host)
         columns["inverse_h"] = 1.0 / h
         with np.errstate(divide="ignore", over="ignore", under="ignore"):
             columns["sigma"] = self.smoothing.sigma / h**self.dimension
@@ -177,6 +185,9 @@ class SPH(Interaction):
         fields = {"x": own["position"], "m": own["mass"], "state": self.slot_state}
         if self.viscosity is not None:
             fields["v"] = own["velocity"]
+        if self.hot:
+            fields["u"] = own[ENERGY]
+        self.fields = fields
         self.loop = PairLoop.over(model, self.pairs, "Fluid", fields, self.Params, self.params)
         self.state = state
         self.laws = self._laws()
@@ -184,7 +195,11 @@ class SPH(Interaction):
         types = precision, self.loop.Data, self.Params
         self.density_term = kernels.density_term(self.weight, *types)
         slope = self.smoothing.slope.function(precision)
-        self.force_term = kernels.force_term(slope, self.laws.get("term"), self.dimension, *types)
+        viscosity = self.laws.get("term")
+        self.force_term = kernels.force_term(slope, viscosity, self.dimension, *types)
+        if self.hot:
+            term = functools.partial(heat_term, slope, viscosity, self.dimension)
+            self.heat = Heat(self, state, term)
 
     def _laws(self) -> dict[str, wp.Function]:
         """The parts' laws as functions of their variables and the fluid's parameters."""
@@ -207,7 +222,7 @@ class SPH(Interaction):
         """Density, pressure and their slots; speeds of sound for a viscosity, or if asked for."""
         sounds = sounds or self.viscosity is not None
         laws = self.laws["pressure"], self.laws["sound_speed"] if sounds else None
-        store = functools.partial(kernels.keep_state, self.weight, *laws)
+        store = functools.partial(kernels.keep_state, self.weight, *laws, self.hot)
         out = {"state": self.slot_state, "rho": state.density, "pressure": state.pressure}
         self.loop.sum(self.density_term, store, out)
 
@@ -236,11 +251,11 @@ class SPH(Interaction):
         self._sum_density(self.state)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
-        """Add the energy m u(rho) at the present positions, and the virial of all pair forces."""
+        """Add the energy m u at the present positions, and the virial of all pair forces."""
         self._sum_density(state)
         precision, energy_law = self.model.precision, self.laws["energy"]
         term = kernels.virial_term(self.force_term, precision, self.loop.Data, self.Params)
-        store = functools.partial(kernels.keep_measure, energy_law)
+        store = functools.partial(kernels.keep_measure, energy_law, self.hot)
         self.loop.sum(term, store, {"energy": energy, "virial": virial})
 
     def interpolate(self, points: Any, field: Any, **options: Any) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 import warp as wp
 
 from .equations_of_state import Tait
+from .heat import ENERGY
 
 # Parts of the rest density between which that of a start lies whose masses fit. Free surfaces halve
 # it there, so what is dense is looked at: of a film of two layers nothing else is left.
@@ -25,9 +26,24 @@ def complaint(fluid: Any) -> str:
     columns = {name: column[world] for name, column in fluid.columns(fluid.parameters).items()}
     h = columns["smoothing_length"]
     return (
-        model.unresolved(fluid.name, "smoothing_length", h, members)
+        _of_energy(fluid, members)
+        or model.unresolved(fluid.name, "smoothing_length", h, members)
         or _of_density(fluid, members, columns)
         or _of_speed(fluid, members, columns)
+    )
+
+
+def _of_energy(fluid: Any, members: np.ndarray) -> str:
+    """The start is one of a run, perhaps of one that went before."""
+    if not fluid.hot:
+        return ""
+    u = fluid.state[ENERGY].numpy()[members]
+    if not (u < 0).any():
+        return ""
+    return (
+        f"{fluid.name}: {ENERGY} must be at least 0 [length^2/time^2], got {u.min():.4g} in "
+        f"particle {members[u.argmin()]}, and below 0 in {(u < 0).sum()} of {len(u)}, whose "
+        "pressure is 0; give a shorter substep."
     )
 
 
