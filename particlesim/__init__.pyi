@@ -42,6 +42,7 @@ from .interactions.fluid.equations_of_state import (
     Polytrope,
     Tait,
 )
+from .interactions.fluid.lengths import AdaptiveSmoothing
 from .interactions.fluid.sph import SPH
 from .interactions.fluid.viscosities import ArtificialViscosity, Viscosity
 from .interactions.grains import HertzianGrains
@@ -71,6 +72,7 @@ from .simulation.simulation import Simulation
 
 __all__ = [
     "SPH",
+    "AdaptiveSmoothing",
     "Angles",
     "ArtificialViscosity",
     "Bonds",

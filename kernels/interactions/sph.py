@@ -107,6 +107,43 @@ def force_term(
     return Term(function(push), 3, DIRECTIONS[dimension], "fused")
 
 
+def heat_term(
+    slope: wp.Function, viscosity: wp.Function | None, dimension: int, kicks: int,
+    precision: Precision, data: Any, params: Any,
+) -> Term:  # fmt: skip
+    """Term m_j (P_i/rho_i^2 + Pi_ij/2) u_ij . grad_i W_ij of heat, at the mean velocities of kicks.
+
+    Coincident particles are taken as h apart, as by the force.
+    """
+    real, vec3, result = precision.scalar, precision.vec3, precision.vector(kicks)
+    state_of, vector_of = reader(precision, 4), reader(precision, 3)
+    aside = vec3(*DIRECTIONS[dimension])
+    viscous, both = viscosity is not None, kicks == 2
+
+    def warm(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
+        apart = r2 > p.closest_squared
+        side = wp.where(d.slot[i] < d.slot[j], -p.smoothing_length, p.smoothing_length)
+        distance2 = wp.where(apart, r2, p.smoothing_length * p.smoothing_length)
+        along = x_ij + wp.where(apart, real(0.0), side) * aside
+        state_i = state_of(d.state, i)
+        state_j = state_of(d.state, j)
+        stress = state_i[2]
+        if wp.static(viscous):
+            v_ij = vector_of(d.v, i) - vector_of(d.v, j)
+            mean = real(0.5) * (state_i + state_j)
+            term = viscosity(wp.dot(v_ij, x_ij), distance2, mean[1], mean[3], p)
+            stress += real(0.5) * term
+        gradient = (state_j[0] * p.sigma) * slope(wp.sqrt(distance2) * p.inverse_h)
+        g = (gradient * stress * p.inverse_h) * p.inverse_h
+        rate = result()
+        rate[0] = g * wp.dot(vector_of(d.u0, i) - vector_of(d.u0, j), along)
+        if wp.static(both):
+            rate[1] = g * wp.dot(vector_of(d.u1, i) - vector_of(d.u1, j), along)
+        return rate
+
+    return Term(function(warm), kicks)
+
+
 def virial_term(force: Term, precision: Precision, data: Any, params: Any) -> Term:
     """Term x_ij . f_ij / 2, the particle's share of the virial."""
     real, vec3, one = precision.scalar, precision.vec3, precision.vector(1)

@@ -16,7 +16,7 @@ from .part import ConstraintBase, Interaction, Thermostat
 # Names of the engine's own per-particle arrays, which attributes of a scene cannot take.
 RESERVED = frozenset(
     "position velocity mass inverse_mass radius force world density pressure correction image "
-    "previous_position position_error velocity_error time dt x".split()
+    "previous_position position_error velocity_error smoothing_length time dt x".split()
 )
 # What else add_particles takes, and how alike a name may be to these.
 ARGUMENTS = ("velocity", "mass", "radius", "group", "pinned", "color", "triangles", "position")

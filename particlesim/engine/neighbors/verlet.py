@@ -9,6 +9,7 @@ for each of its blocks.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from .all_pairs import AllPairs
 from .blocks import blocks, blocks_struct
 from .clusters import ClusterRows
 from .hash_rows import HashRows
+from .own_reach import OwnReach
 from .skin import Skin
 
 DIRECT = 8192  # largest world that CUDA looks through directly; measured
@@ -45,6 +47,7 @@ class VerletList(AllPairs):
         self.cutoff = np.zeros(model.world_count)  # 0: nothing is looked for in that world
         # By world: of particles that differ much in size, half the cutoff of each; else None.
         self.half: list[np.ndarray | None] = [None] * model.world_count
+        self.own: OwnReach | None = None
         self.generation = 0
 
     def _cut(self) -> np.ndarray:
@@ -52,7 +55,11 @@ class VerletList(AllPairs):
         ranges = (self.begin_host, self.end_host)
         cuts = list(blocks(*ranges, self.cutoff, self.half))
         self.blocks = [block for _, of_world, _ in cuts for block in of_world]
-        self.skin = Skin(self.model, np.array([most for *_, most in cuts]), ~self.for_interactions)
+        unit = np.array([most for *_, most in cuts])
+        if self.own is not None:
+            unit = self.own.typical(self.members_host, self.model)
+            self.blocks = [replace(each, own=float(unit[each.world])) for each in self.blocks]
+        self.skin = Skin(self.model, unit, ~self.for_interactions)
         self.struct = blocks_struct(self.model, [of_world for _, of_world, _ in cuts])
         return self.members_host[np.concatenate([order for order, _, _ in cuts])]
 
@@ -62,6 +69,8 @@ class VerletList(AllPairs):
         self._check_box()
         members = self._cut()
         self.members = model.array(members, wp.int32)
+        if self.own is not None:
+            self.own.allocate(self, state)
         # By phase and world, once there are rows; in a phase that does not renew them never.
         renewed = np.array([self.for_interactions, self.for_constraints])
         self.margins_squared = model.array(np.where(renewed, 0.0, np.inf), real)
@@ -113,12 +122,15 @@ class VerletList(AllPairs):
 
     def persistent(self) -> dict[str, wp.array]:
         """What rows are made from, besides what never changes."""
-        return {"x": self.x_listed, **self.skin.persistent()}
+        own = {} if self.own is None else {"reach": self.own.reach}
+        return {"x": self.x_listed, **own, **self.skin.persistent()}
 
     def worlds(self, name: str) -> np.ndarray:
         """The world of each row of one of these."""
         if name == "x":
             return self.model.world_of[self.members_host]
+        if name == "reach":
+            return self.model.world_of
         return np.arange(self.model.world_count)
 
     @property
@@ -182,11 +194,15 @@ class VerletList(AllPairs):
              farthest],
             model.device,
         )  # fmt: skip
+        if self.own is not None:
+            self.own.take()
         self.skin.choose(state, self.moved)
         self.rebuild()
 
     def rebuild(self) -> None:
         """Make the rows of the worlds marked as moved from ``x_listed``, and unmark them."""
+        if self.own is not None:
+            self.own.set_cutoffs()
         inputs = [self.moved, self.skin.struct, self.struct, self.margins_squared]
         reach = reach_kernel(self.model.precision)
         launch(reach, self.model.world_count, inputs, self.model.device)
@@ -257,5 +273,10 @@ class VerletList(AllPairs):
         length = self.model.box_length[world]
         d -= np.where(length > 0, length * np.round(d / np.where(length > 0, length, 1.0)), 0.0)
         first = self.struct.first.numpy()[world]
-        reach = self.blocks[of[slot]].cutoff[of[others] - first] + self.skin.thickness[world]
+        if self.own is None:
+            reach = self.blocks[of[slot]].cutoff[of[others] - first]
+        else:
+            each = self.own.reach.numpy().astype(np.float64)
+            reach = np.maximum(each[order[slot]], each[order[others]])
+        reach = reach + self.skin.thickness[world]
         return (others != slot) & ((d**2).sum(axis=1) < reach**2)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from ...engine.model import Model
 from ...engine.state import State
 from ...kernels.engine.loops import Term
 from ...kernels.interactions import heat as kernels
-from ...scene.part import Interaction
 from ..pair_loop import PairLoop
 
 ENERGY = "internal_energy"  # the attribute, per mass [length^2/time^2]
@@ -109,36 +107,3 @@ class Heat:
             launch(self.kernels.mean_velocity, self.pairs.count, inputs, device)
         out = {f"rate{k}": each for k, each in enumerate(self.rates)}
         self.loop.sum(self.term, functools.partial(kernels.keep_rates, self.kicks), out)
-
-
-class Heated(Interaction):
-    """What may have a heat: an internal energy that goes on in time, or none."""
-
-    heat: Heat | None = None  # once attached, if it has one
-
-    def keep_heat(self) -> None:
-        """It has one."""
-        self.requires |= {ENERGY, "inverse_mass"}
-        self.evolves = frozenset({ENERGY})
-        self.reads_velocity = self.conservative = True
-
-    def begin(self, state: State, dt: float) -> None:
-        if self.heat is not None:
-            self.heat.begin(dt)
-
-    def advance(self, state: State, dt: float) -> None:
-        if self.heat is not None:
-            self.heat.advance(dt)
-
-    def carry(self, state: State, dt: float) -> None:
-        if self.heat is not None:
-            self.heat.carry(dt)
-
-    def carried(self) -> list[wp.array]:
-        return list(self.persistent().values())
-
-    def persistent(self) -> dict[str, wp.array]:
-        return {} if self.heat is None else self.heat.persistent()
-
-    def reset(self, worlds: Sequence[int]) -> None:
-        self.forget(self.persistent(), worlds)

@@ -15,11 +15,13 @@ from ...engine.neighbors.lists import Neighbors
 from ...engine.neighbors.verlet import VerletList
 from ...engine.probe import Probe
 from ...engine.state import State
+from ...kernels.interactions import lengths as of_lengths
 from ...kernels.interactions import sph as kernels
-from ...kernels.interactions.heat import heat_term
 from ..pair_loop import PairLoop
 from .equations_of_state import EquationOfState
-from .heat import ENERGY, Heat, Heated, check_energies
+from .evolving import Evolving
+from .heat import ENERGY, Heat, check_energies
+from .lengths import LENGTH, AdaptiveSmoothing, Lengths
 from .limits import fluid_limits
 from .smoothing import SMOOTHING, SUPPORT
 from .starts import complaint
@@ -35,7 +37,7 @@ VARIABLES = {
 COINCIDENT = 1e-6  # closer than this, in parts of h, particles count as coincident
 
 
-class SPH(Heated):
+class SPH(Evolving):
     r"""A fluid: density by summation, symmetric pressure force, viscosity.
 
         rho_i = sum_j m_j W_ij                    (over all j within 2 h, i itself included)
@@ -88,15 +90,13 @@ class SPH(Heated):
     requires = frozenset({"force", "velocity", "mass", "density", "pressure"})
 
     def __init__(
-        self, group: Any = None, *, smoothing_length: float, equation_of_state: EquationOfState,
+        self, group: Any = None, *, smoothing_length: float | AdaptiveSmoothing,
+        equation_of_state: EquationOfState,
         rest_density: float | None = None, smoothing: str = "wendland_c2",
         viscosity: Viscosity | None = None, dimension: int = 3,
     ):  # fmt: skip
         self.group = group
-        h = validate.number(
-            self.name, "smoothing_length", smoothing_length, above=0.0, unit="length"
-        )
-        self.cutoff = SUPPORT * h
+        self.parameters: dict[str, Any] = self.take_length(smoothing_length)
         self.equation_of_state = _of_kind(
             self.name, "equation_of_state", equation_of_state, EquationOfState,
             "Tait(sound_speed)",
@@ -113,7 +113,6 @@ class SPH(Heated):
                 self.name, "dimension", "be 1, 2 or 3", dimension, "choose one of these"
             )
         self.dimension, self.smoothing = dimension, functions[dimension]
-        self.parameters: dict[str, Any] = {"smoothing_length": h}
         if rest_density is not None:
             self.parameters["rest_density"] = validate.number(
                 self.name, "rest_density", rest_density, above=0.0, unit="mass/length^d"
@@ -126,6 +125,10 @@ class SPH(Heated):
         if self.hot:
             self.keep_heat()
 
+    def _variables(self, name: str) -> tuple[str, ...]:
+        """What a law is called with."""
+        return VARIABLES[name] if self.adaptive is None else (*VARIABLES[name], LENGTH)
+
     def _take(self, prefix: str, part: EquationOfState | Viscosity) -> None:
         """Note what fills the arguments of a part's laws; its parameters join the fluid's."""
         own = {name: f"p.{name}" for name in ("smoothing_length", "rest_density")}
@@ -133,7 +136,7 @@ class SPH(Heated):
             self.parameters[f"{prefix}_{name}"] = value
             own[name] = f"p.{prefix}_{name}"
         for name, law in part.laws.items():
-            sources = own | {variable: variable for variable in VARIABLES[name]}
+            sources = own | {variable: variable for variable in self._variables(name)}
             validate.known(part.name, law.parameters, sources, f"argument of {law.name}")
             if "rest_density" in law.parameters and "rest_density" not in self.parameters:
                 raise validate.fail(
@@ -150,33 +153,30 @@ class SPH(Heated):
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
         columns = self.columns(self.parameters)
-        h = columns["smoothing_length"]
         read = {"velocity": self.viscosity is not None, ENERGY: self.hot}
-        pairs = neighbors.of(self, {"mass"} | {name for name, on in read.items() if on})
-        assert isinstance(pairs, VerletList)  # as there is a cutoff
+        names = {"mass"} | {name for name, on in read.items() if on}
+        if self.adaptive is None:
+            pairs = neighbors.of(self, names)
+            assert isinstance(pairs, VerletList)  # as there is a cutoff
+            least = most = columns[LENGTH]
+        else:
+            self.lengths = Lengths(self, model)
+            pairs, columns = (
+                self.lengths.request(neighbors, names),
+                columns | self.lengths.columns(),
+            )
+            least, most = self.lengths.least, self.lengths.most
         self.pairs = pairs
         if self.hot:
             check_energies(self.name, model, pairs.members_host)
-        columns["inverse_h"] = 1.0 / h
-        with np.errstate(divide="ignore", over="ignore", under="ignore"):
-            columns["sigma"] = self.smoothing.sigma / h**self.dimension
-        columns |= {"cutoff_squared": (SUPPORT * h) ** 2, "closest_squared": (COINCIDENT * h) ** 2}
-        self._check_range(columns)
+        columns |= {"cutoff_squared": (SUPPORT * most) ** 2}
+        columns |= {"closest_squared": (COINCIDENT * least) ** 2}
+        for h in (least, most):
+            self.check_range(h, columns["closest_squared"])
+        if self.lengths is None:
+            columns |= {"inverse_h": 1.0 / h, "sigma": self.smoothing.sigma / h**self.dimension}
         model.fits(self.name, {name: columns[name] for name in self.parameters})
         self.Params, self.params = model.parameters("FluidParameters", columns)
-
-    def _check_range(self, columns: dict[str, np.ndarray]) -> None:
-        """Powers of h must be normal numbers of the precision."""
-        limits = np.finfo(self.model.precision.numpy)
-        for name in ("sigma", "closest_squared"):
-            bad = ~((columns[name] > limits.tiny) & (columns[name] < limits.max))
-            if bad.any():
-                raise validate.fail(
-                    self.name, "smoothing_length",
-                    f"have h^2 and h^-{self.dimension} within {limits.dtype}",
-                    float(columns["smoothing_length"][np.argmax(bad)]),
-                    "choose another unit of length, or precision=\"float64\"",
-                )  # fmt: skip
 
     def attach(self, model: Model, state: State) -> None:
         precision, own = model.precision, self.pairs.fields
@@ -187,19 +187,26 @@ class SPH(Heated):
             fields["v"] = own["velocity"]
         if self.hot:
             fields["u"] = own[ENERGY]
+        if self.lengths is not None:
+            self.lengths.attach(state)
+            fields["size"] = self.lengths.size
         self.fields = fields
         self.loop = PairLoop.over(model, self.pairs, "Fluid", fields, self.Params, self.params)
         self.state = state
         self.laws = self._laws()
         self.weight = self.smoothing.weight.function(precision)
         types = precision, self.loop.Data, self.Params
-        self.density_term = kernels.density_term(self.weight, *types)
         slope = self.smoothing.slope.function(precision)
-        viscosity = self.laws.get("term")
-        self.force_term = kernels.force_term(slope, viscosity, self.dimension, *types)
+        made = kernels if self.lengths is None else of_lengths
+        viscous = slope, self.laws.get("term"), self.dimension
+        self.force_term = made.force_term(*viscous, *types)
         if self.hot:
-            term = functools.partial(heat_term, slope, viscosity, self.dimension)
-            self.heat = Heat(self, state, term)
+            self.heat = Heat(self, state, functools.partial(made.heat_term, *viscous))
+        if self.lengths is None:
+            self.density_term = kernels.density_term(self.weight, *types)
+        else:
+            self.lengths.over(self.loop, self.weight, slope)
+            self.lengths.start()
 
     def _laws(self) -> dict[str, wp.Function]:
         """The parts' laws as functions of their variables and the fluid's parameters."""
@@ -207,7 +214,7 @@ class SPH(Heated):
         parts = [self.equation_of_state, *([self.viscosity] if self.viscosity else [])]
         return {
             name: kernels.bound_law(
-                name, law.function(precision, part.name, float), VARIABLES[name],
+                name, law.function(precision, part.name, float), self._variables(name),
                 self.sources[name], precision, self.Params,
             )
             for part in parts
@@ -215,13 +222,18 @@ class SPH(Heated):
         }  # fmt: skip
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        self._sum_density(state)
+        self.sum_density(state)
         self.loop.sum(self.force_term, kernels.add_force, {"f": state.force})
+        if self.lengths is not None:
+            self.lengths.flag(state)
 
-    def _sum_density(self, state: State, sounds: bool = False) -> None:
+    def sum_density(self, state: State, sounds: bool = False) -> None:
         """Density, pressure and their slots; speeds of sound for a viscosity, or if asked for."""
         sounds = sounds or self.viscosity is not None
         laws = self.laws["pressure"], self.laws["sound_speed"] if sounds else None
+        if self.lengths is not None:
+            self.lengths.search(state, laws, self.slot_state)
+            return
         store = functools.partial(kernels.keep_state, self.weight, *laws, self.hot)
         out = {"state": self.slot_state, "rho": state.density, "pressure": state.pressure}
         self.loop.sum(self.density_term, store, out)
@@ -238,7 +250,7 @@ class SPH(Heated):
         """Speed of sound at the present densities, of each member [length/time]."""
         probe.force([self])
         if self.viscosity is None:  # whose passes have no need of it
-            self._sum_density(probe.state, sounds=True)
+            self.sum_density(probe.state, sounds=True)
         c = np.empty(self.pairs.count)
         members = self.pairs.members_host
         c[np.searchsorted(members, self.pairs.order.numpy())] = self.slot_state.numpy()[:, 3]
@@ -248,14 +260,15 @@ class SPH(Heated):
         """Density, pressure and their slots at the present positions; not within a substep."""
         self.pairs.update(self.state)
         self.pairs.grow()
-        self._sum_density(self.state)
+        self.look_at_density(self.state)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         """Add the energy m u at the present positions, and the virial of all pair forces."""
-        self._sum_density(state)
+        self.look_at_density(state)
         precision, energy_law = self.model.precision, self.laws["energy"]
         term = kernels.virial_term(self.force_term, precision, self.loop.Data, self.Params)
-        store = functools.partial(kernels.keep_measure, energy_law, self.hot)
+        keep = (kernels if self.lengths is None else of_lengths).keep_measure
+        store = functools.partial(keep, energy_law, self.hot)
         self.loop.sum(term, store, {"energy": energy, "virial": virial})
 
     def interpolate(self, points: Any, field: Any, **options: Any) -> np.ndarray:

@@ -24,7 +24,7 @@ def complaint(fluid: Any) -> str:
         return ""
     model, world = fluid.model, fluid.model.world_of[members]
     columns = {name: column[world] for name, column in fluid.columns(fluid.parameters).items()}
-    h = columns["smoothing_length"]
+    h = columns["smoothing_length"] = fluid.smoothing_lengths(members)
     return (
         _of_energy(fluid, members)
         or model.unresolved(fluid.name, "smoothing_length", h, members)
