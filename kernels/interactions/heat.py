@@ -14,13 +14,25 @@ from typing import Any
 
 import warp as wp
 
+from ..engine.integrate import compensated_sum
 from ..precision import Precision, function, register
 
 
 @functools.cache
-def heat_kernels(precision: Precision) -> SimpleNamespace:
+def heat_kernels(precision: Precision, compensated: bool) -> SimpleNamespace:
     """Kernels around the sum: mean velocities of kicks, and internal energies that go on."""
-    real, vec3 = precision.scalar, precision.vec3
+    real, vec3, add = precision.scalar, precision.vec3, compensated_sum(precision.scalar)
+    RealArray = wp.array(dtype=real)
+
+    def rise(i: int, du: real, u_io: RealArray, error_io: RealArray):
+        if wp.static(compensated):
+            u, error = add(u_io[i], du, error_io[i])
+            u_io[i] = u
+            error_io[i] = error
+        else:
+            u_io[i] = u_io[i] + du
+
+    rise_by = function(rise)
 
     @register
     def mean_velocity(
@@ -44,10 +56,11 @@ def heat_kernels(precision: Precision) -> SimpleNamespace:
         dt: real,
         rate: wp.array(dtype=real),
         u_io: wp.array(dtype=real),
+        error_io: wp.array(dtype=real),
     ):
         """u += rate dt."""
         i = members[first + wp.tid()]
-        u_io[i] = u_io[i] + rate[i] * dt
+        rise_by(i, rate[i] * dt, u_io, error_io)
 
     @register
     def heat_late(
@@ -58,10 +71,11 @@ def heat_kernels(precision: Precision) -> SimpleNamespace:
         following: wp.array(dtype=real),
         early_io: wp.array(dtype=real),
         u_io: wp.array(dtype=real),
+        error_io: wp.array(dtype=real),
     ):
         """u += (late - early) dt / 2: what was foreseen of the second half is made good."""
         i = members[first + wp.tid()]
-        u_io[i] = u_io[i] + (late[i] - early_io[i]) * half
+        rise_by(i, (late[i] - early_io[i]) * half, u_io, error_io)
         early_io[i] = following[i]
 
     return SimpleNamespace(mean_velocity=mean_velocity, heat=heat, heat_late=heat_late)

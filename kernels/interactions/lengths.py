@@ -77,37 +77,6 @@ def length_kernels(precision: Precision) -> SimpleNamespace:
     return SimpleNamespace(begin=begin_search, step=take_step)
 
 
-@functools.cache
-def grown_kernel(precision: Precision) -> wp.Kernel:
-    """Kernel: new rows for worlds in which a length has used up half of its room."""
-    real, vec2 = precision.scalar, precision.vector(2)
-
-    @register
-    def flag_grown(
-        first: int,
-        order: wp.array(dtype=wp.int32),
-        world: wp.array(dtype=wp.int32),
-        bounds: wp.array(dtype=vec2),
-        support: real,
-        room: real,
-        reach: wp.array(dtype=real),
-        h: wp.array(dtype=real),
-        moved: wp.array(dtype=wp.int32),
-        any_moved: wp.array(dtype=wp.int32),
-    ):
-        i = first + wp.tid()
-        particle = order[i]
-        w = world[i]
-        far = reach[particle]
-        if h[particle] * room > far and far < real(0.9999) * support * bounds[w][1]:
-            if moved[w] == 0:
-                moved[w] = 1
-            if any_moved[0] == 0:
-                any_moved[0] = 1
-
-    return flag_grown
-
-
 def length_term(
     weight: wp.Function, slope: wp.Function, precision: Precision, data: Any, params: Any
 ) -> Term:

@@ -187,16 +187,17 @@ def keep_measure(
 
 @functools.cache
 def interpolation_kernel(
-    weight: wp.Function, precision: Precision, periodic: Periodicity, params: Any
+    weight: wp.Function, precision: Precision, periodic: Periodicity, params: Any, own: bool = False
 ) -> wp.Kernel:
     """Kernel: sum_j V_j A_j W(r - r_j, h) and sum_j V_j W(r - r_j, h) at each point r.
 
-    ``samples`` are (V_j A_j, V_j), the volumes being m_j / rho_j.
+    ``samples`` are (V_j A_j, V_j), the volumes being m_j / rho_j; ``sizes`` (1/h_j, sigma/h_j^d)
+    where particles have lengths of their own.
     """
     real, vec3, vec4, Box = (
         precision.scalar, precision.vec3, precision.vector(4), box_type(precision),
     )  # fmt: skip
-    image = minimum_image(precision, periodic)
+    image, vec2 = minimum_image(precision, periodic), precision.vector(2)
 
     @register
     def interpolate(
@@ -207,6 +208,7 @@ def interpolation_kernel(
         parameters: wp.array(dtype=params),
         x: wp.array(dtype=vec3),
         samples: wp.array(dtype=vec4),
+        sizes: wp.array(dtype=vec2),
         points: wp.array(dtype=vec3),
         u: wp.array(dtype=vec3),
         sums_out: wp.array(dtype=vec4),
@@ -220,7 +222,13 @@ def interpolation_kernel(
             x_ij = image(points[k] - x[j], box[world])
             r2 = wp.dot(x_ij, x_ij)
             if r2 < p.cutoff_squared:
-                total += samples[j] * weight(wp.sqrt(r2) * p.inverse_h)
-        sums_out[k] = total * p.sigma
+                r = wp.sqrt(r2)
+                if wp.static(own):
+                    total += samples[j] * (weight(r * sizes[j][0]) * sizes[j][1])
+                else:
+                    total += samples[j] * weight(r * p.inverse_h)
+        if wp.static(not own):
+            total *= p.sigma
+        sums_out[k] = total
 
     return interpolate

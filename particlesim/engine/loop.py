@@ -90,8 +90,7 @@ class Loop:
         """Advance by ``dt``: interactions, integration, constraints, velocities."""
         self.observers.begin(dt)
         act(self.integrator, self.integrator.begin, dt)
-        if self.integrator.carries_forces:
-            self._go_on("begin", dt)
+        self._go_on("begin", dt)
         self.forces(dt)
         self.follow(dt)
         act(self.integrator, self.integrator.advance, dt)

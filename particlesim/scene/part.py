@@ -173,7 +173,7 @@ class Interaction(Part):
         raise validate.undefined(self, "apply(self, state, neighbors, dt)")
 
     def begin(self, state: Any, dt: float) -> None:
-        """Before the forces of velocity Verlet: its own comes to where it is foreseen to end."""
+        """Before a substep's forces: its own comes to where it is foreseen to be with them."""
 
     def advance(self, state: Any, dt: float) -> None:
         """Its own goes on, as of a field, once in a substep; ``apply`` leaves that as it is."""

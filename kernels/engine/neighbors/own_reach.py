@@ -72,6 +72,38 @@ def own_reach_kernels(precision: Precision) -> SimpleNamespace:
 
 
 @functools.cache
+def grown_kernel(precision: Precision) -> wp.Kernel:
+    """Kernel: flag worlds in which a size has grown so that ``room`` times it is beyond a reach.
+
+    Unless that is as far as it may be.
+    """
+    real = precision.scalar
+
+    @register
+    def flag_grown(
+        first: int,
+        members: wp.array(dtype=wp.int32),
+        world: wp.array(dtype=wp.int32),
+        most: wp.array(dtype=wp.float64),
+        room: real,
+        size: wp.array(dtype=real),
+        reach: wp.array(dtype=real),
+        moved: wp.array(dtype=wp.int32),
+        any_moved: wp.array(dtype=wp.int32),
+    ):
+        k = first + wp.tid()
+        i = members[k]
+        w = world[k]
+        if room * size[i] > reach[i] and reach[i] < real(most[w]):
+            if moved[w] == 0:
+                moved[w] = 1
+            if any_moved[0] == 0:
+                any_moved[0] = 1
+
+    return flag_grown
+
+
+@functools.cache
 def spreading_kernels(precision: Precision) -> SimpleNamespace:
     """Kernels: reaches with the skin, by slot and by super."""
     real, Supers = precision.scalar, supers_type(precision)

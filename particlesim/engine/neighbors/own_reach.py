@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ...kernels.engine.neighbors.own_reach import own_reach_kernels, spreading_kernels
+from ...kernels.engine.neighbors.own_reach import grown_kernel, own_reach_kernels, spreading_kernels
 from ..execution.launch import launch
 from ..model import Model
 from ..state import State
@@ -17,18 +17,21 @@ class OwnReach:
     """How far each particle of a list looks: i and j are listed within the farther of the two.
 
     A particle's reach is taken when rows are made, from a size of it that is an array of the state,
-    with room for it to grow. Who changes that array says when there is no more room, by marking the
-    world as moved (``VerletList.mark`` on the device).
+    with room for it to grow; they are made anew once half of that is used up.
 
     Args:
         size: Name of the array of the state.
-        factor: Of a reach over the size, at rows' making.
+        factor: Of what a particle reaches over its size.
+        growth: Of a size until its reach is no longer enough.
         first: Sizes at the start, (n,) over all particles [length].
         most: No reach is longer, (worlds,) [length].
     """
 
-    def __init__(self, size: str, factor: float, first: np.ndarray, most: np.ndarray):
-        self.size, self.factor, self.first, self.most_host = size, factor, first, most
+    def __init__(
+        self, size: str, factor: float, growth: float, first: np.ndarray, most: np.ndarray
+    ):
+        self.size, self.factor, self.first, self.most_host = size, factor * growth, first, most
+        self.room = factor * 0.5 * (1.0 + growth)
         self.reach: wp.array  # that rows were made with, (n,)
 
     def typical(self, members: np.ndarray, model: Model) -> np.ndarray:
@@ -46,6 +49,17 @@ class OwnReach:
         self.most = model.array(self.most_host, wp.float64)
         self.longest = wp.zeros(model.world_count, dtype=wp.float32, device=model.device)
         self.kernels = own_reach_kernels(model.precision)
+
+    def flag(self) -> None:
+        """Mark worlds in which a size has used up half of its room.
+
+        Whose list it is does so before the forces of a substep, and nowhere else: rows are then
+        made at the same moments, whatever was looked at in between.
+        """
+        listed = self.listed
+        inputs = [listed.members, listed.world, self.most, self.room, self.state[self.size],
+                  self.reach, listed.moved, listed.any_moved]  # fmt: skip
+        launch(grown_kernel(listed.model.precision), listed.count, inputs, listed.model.device)
 
     def take(self) -> None:
         """Reaches of the worlds marked as moved, from their present sizes."""

@@ -243,6 +243,8 @@ class VerletList(AllPairs):
         least = min((each.cutoff.min() + thick[each.world] for each in looking), default=0.0)
         most = max((each.cutoff.max() + thick[each.world] for each in looking), default=0.0)
         reach = f"{most:g}" if least == most else f"{least:g} to {most:g}"
+        if self.own is not None:
+            reach = f"{self.own.factor:g} times the {self.own.size.replace('_', ' ')}"
         return (
             f"within {reach} of {self.count} particles, {mean:.0f} listed on average, room for "
             f"{self.capacity}, {self.layout.describe()}, for {', '.join(self.users)}"
@@ -251,7 +253,8 @@ class VerletList(AllPairs):
     @property
     def memory(self) -> int:
         own = [self.x_listed, self.index, self.pairs.count, self.pairs.row, self.found,
-               self.pairs.lead, self.pairs.cluster, *self.layout.arrays]  # fmt: skip
+               self.pairs.lead, self.pairs.cluster, *self.layout.arrays,
+               *([] if self.own is None else [self.own.reach])]  # fmt: skip
         return super().memory + sum(a.capacity for a in own)
 
     def neighbors_of(self, particle: int) -> np.ndarray:

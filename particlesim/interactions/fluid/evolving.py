@@ -65,6 +65,8 @@ class Evolving(Interaction):
                 )  # fmt: skip
 
     def begin(self, state: State, dt: float) -> None:
+        if self.lengths is not None:
+            self.lengths.reach.flag()
         if self.heat is not None:
             self.heat.begin(dt)
 
@@ -77,7 +79,7 @@ class Evolving(Interaction):
             self.heat.carry(dt)
 
     def carried(self) -> list[wp.array]:
-        return list(self.persistent().values())
+        return [] if self.heat is None else self.heat.carried()
 
     def persistent(self) -> dict[str, wp.array]:
         return {} if self.heat is None else self.heat.persistent()

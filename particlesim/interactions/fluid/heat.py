@@ -69,27 +69,34 @@ class Heat:
         fields = {**fluid.fields, **{f"u{k}": each for k, each in enumerate(self.means)}}
         self.loop = PairLoop.over(model, self.pairs, "Heat", fields, fluid.Params, fluid.params)
         self.term: Term = term(self.kicks, precision, self.loop.Data, fluid.Params)
-        self.kernels = kernels.heat_kernels(precision)
+        self.error = wp.zeros_like(self.rates[0]) if model.settings.compensated else None
+        self.kernels = kernels.heat_kernels(precision, self.error is not None)
 
     def persistent(self) -> dict[str, wp.array]:
-        """What outlives a substep."""
-        return {} if self.early is None else {"early": self.early}
+        """What outlives a substep: rates of the next kick, and what rounding has kept from u."""
+        kept = {"early": self.early, "error": self.error}
+        return {name: array for name, array in kept.items() if array is not None}
+
+    def carried(self) -> list[wp.array]:
+        """What :meth:`carry` writes."""
+        return [] if self.early is None else [self.early]
 
     def begin(self, dt: float) -> None:
-        """u as it will be at the end of a substep, if it goes on as at its start."""
-        inputs = [self.pairs.members, dt, self.early, self.state[ENERGY]]
-        launch(self.kernels.heat, self.pairs.count, inputs, self.model.device)
+        """u as it will be with the forces, if it goes on as at the start of the substep."""
+        if self.early is not None:
+            inputs = [self.pairs.members, dt, self.early, self.state[ENERGY], self.error]
+            launch(self.kernels.heat, self.pairs.count, inputs, self.model.device)
 
     def advance(self, dt: float) -> None:
         """u after the kick of ``dt`` that has just been, by the last forces."""
         u, device = self.state[ENERGY], self.model.device
         if self.kicks == 1:
             self._sum(-0.5 * dt)
-            inputs = [self.pairs.members, dt, self.rates[0], u]
+            inputs = [self.pairs.members, dt, self.rates[0], u, self.error]
             launch(self.kernels.heat, self.pairs.count, inputs, device)
             return
         self._sum(-0.25 * dt, 0.25 * dt)
-        inputs = [self.pairs.members, 0.5 * dt, *self.rates, self.early, u]
+        inputs = [self.pairs.members, 0.5 * dt, *self.rates, self.early, u, self.error]
         launch(self.kernels.heat_late, self.pairs.count, inputs, device)
 
     def carry(self, dt: float) -> None:

@@ -90,7 +90,7 @@ class Lengths:
             self.most[w] = min(self.most[w], *(0.25 * side for side in sides), np.inf)
         self.least = SMALLEST * self.most
         first[self.members] = np.minimum(first[self.members], self.most[world])
-        self.reach = OwnReach(LENGTH, SUPPORT * GROWTH, first, SUPPORT * self.most)
+        self.reach = OwnReach(LENGTH, SUPPORT, GROWTH, first, SUPPORT * self.most)
 
     def request(self, neighbors: Neighbors, names: set[str]) -> VerletList:
         """The list of the fluid."""
@@ -160,13 +160,6 @@ class Lengths:
         call(self.searching.zero_)
         self.loop.sum(self.term, store, out)
 
-    def flag(self, state: State) -> None:
-        """Have rows made anew where lengths have grown."""
-        pairs, room = self.pairs, SUPPORT * 0.5 * (1.0 + GROWTH)
-        inputs = [pairs.order, pairs.world, self.bounds, SUPPORT, room, self.reach.reach,
-                  state[LENGTH], pairs.moved, pairs.any_moved]  # fmt: skip
-        launch(kernels.grown_kernel(self.model.precision), pairs.count, inputs, self.model.device)
-
     # Outside a substep ------------------------------------------------------------------------
 
     def settle(self, worlds: Sequence[int]) -> None:
@@ -196,6 +189,10 @@ class Lengths:
         host[rows] = self.started[rows]
         array.assign(host)
         self.pairs.renew(self.state, list(worlds))
+
+    def widest(self, slots: slice) -> float:
+        """How far the particle among these slots reaches that reaches farthest [length]."""
+        return float(SUPPORT * 1.001 / self.size.numpy()[slots, 0].min())
 
     def at_bound(self) -> np.ndarray:
         """Whether each member has the largest length that there is."""

@@ -224,8 +224,6 @@ class SPH(Evolving):
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         self.sum_density(state)
         self.loop.sum(self.force_term, kernels.add_force, {"f": state.force})
-        if self.lengths is not None:
-            self.lengths.flag(state)
 
     def sum_density(self, state: State, sounds: bool = False) -> None:
         """Density, pressure and their slots; speeds of sound for a viscosity, or if asked for."""
