@@ -41,9 +41,9 @@ class AdaptiveSmoothing:
     Args:
         eta: h in spacings of particles, above 0: 1.2 makes 58 neighbours in three dimensions, 1.6
             makes 137.
-        largest: No h is above it [length]; particles that would need more, as those that fly off by
-            themselves, keep it. None: four times the largest of the start. In a periodic box a
-            quarter of the shortest side at most.
+        largest: No h is above it [length]; particles that would need more, as those that fly off
+            by themselves, keep it. None: about four times the largest of the start. In a periodic
+            box a quarter of the shortest side at most.
 
     Raises:
         ValueError: A value out of range.
@@ -165,14 +165,14 @@ class Lengths:
     def settle(self, worlds: Sequence[int]) -> None:
         """Lengths that fit the present positions of these worlds, however far they are off."""
         fluid, state, world = self.fluid, self.state, self.model.world_of[self.members]
-        room = (1 - 1e-4) / SUPPORT
+        nearly = 1 - 1e-4
         for _ in range(RENEWALS):
             self.pairs.renew(state, list(worlds))
             self.pairs.update(state)
             fluid.sum_density(state)
             h = state[LENGTH].numpy()[self.members]
             reach = self.reach.reach.numpy()[self.members]
-            short = (h > room * reach) & (reach < 2 * room * self.most[world])
+            short = (SUPPORT * h > nearly * reach) & (reach < nearly * SUPPORT * self.most[world])
             if not (short.any() or self.searching.numpy()[0]):
                 break
         self.pairs.renew(state, list(worlds))
@@ -192,7 +192,7 @@ class Lengths:
 
     def widest(self, slots: slice) -> float:
         """How far the particle among these slots reaches that reaches farthest [length]."""
-        return float(SUPPORT * 1.001 / self.size.numpy()[slots, 0].min())
+        return float(SUPPORT * 1.001 * self.following.numpy()[slots].max())
 
     def at_bound(self) -> np.ndarray:
         """Whether each member has the largest length that there is."""
