@@ -16,10 +16,10 @@ SHOCK, TAIL, HEAD = 1.752155732, -0.070272813, -(GAMMA**0.5)
 PINNED = 10  # particles at either end
 
 frames = 4
-settings = ps.Settings(dt=0.05, substeps=600, integrator="velocity_verlet")
+settings = ps.Settings(dt=0.05, substeps=300, integrator="velocity_verlet")
 
 
-def build(count: int = 800, eta: float = 1.2, alpha: float = 1.0, beta: float = 2.0) -> ps.Scene:
+def build(count: int = 400, eta: float = 1.2, alpha: float = 1.0, beta: float = 2.0) -> ps.Scene:
     """The tube from -1/2 to 1/2, with (density, pressure) = (1, 1) and (1/8, 1/10).
 
     Args:
