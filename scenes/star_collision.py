@@ -1,9 +1,9 @@
 """Two polytropic stars collide and merge.
 
-Units of one star's mass and radius, G = 1. Each star is at first a polytrope of index 1, P = K rho^2
-with K = 2 R^2 / pi, whose density is sin(pi r) / (4 r) (Lane-Emden); SPH holds it against its gravity,
-with smoothing lengths that follow the density. The gas has gamma = 2, so that it stays one where
-nothing heats it, and where the stars meet shocks turn motion into heat.
+Units of one star's mass and radius, G = 1. Each star is at first a polytrope of index 1,
+P = K rho^2 with K = 2 R^2 / pi, whose density is sin(pi r) / (4 r) (Lane-Emden); SPH holds it
+against its gravity, with smoothing lengths that follow the density. The gas has gamma = 2, so that
+it stays one where nothing heats it, and where the stars meet shocks turn motion into heat.
 """
 
 import numpy as np
