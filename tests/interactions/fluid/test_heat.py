@@ -1,5 +1,6 @@
 """Internal energies that go on in time: sums, first law, orders, worlds, restarts."""
 
+import functools
 import itertools
 
 import numpy as np
@@ -11,6 +12,9 @@ from cases.worlds import equal_alone
 GAMMA, H = 1.4, 0.7
 VISCOSITY = ps.ArtificialViscosity(1.0, 2.0)
 METHODS = ("symplectic_euler", "velocity_verlet")
+# Kernels of one kind are enough for every run, and more of them for the long one.
+LONG = pytest.mark.slow
+SHORT_OR_LONG = [METHODS[0], pytest.param(METHODS[1], marks=LONG)]
 
 
 @pytest.fixture
@@ -30,7 +34,7 @@ def gas(cloud):
     return build
 
 
-def simulate(scene, device="cpu", integrator="velocity_verlet", dt=0.01, **knobs):
+def simulate(scene, device="cpu", integrator="symplectic_euler", dt=0.01, **knobs):
     settings = ps.Settings(
         dt=dt, integrator=integrator, **{"substeps": 2, "precision": "float64", **knobs}
     )
@@ -52,10 +56,10 @@ def reference_rates(x, v, m, u):
     return (m * stress * sigma / H**2 * -5 * s**3 * approach).sum(axis=1)
 
 
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", [pytest.param("float32", marks=LONG), "float64"])
 def test_heats_by_the_sum_of_the_paper(gas, precision):
     scene, dt = gas(), 1e-6
-    sim = simulate(scene, integrator="symplectic_euler", precision=precision, dt=dt, substeps=1)
+    sim = simulate(scene, precision=precision, dt=dt, substeps=1)
     u = scene.column("internal_energy")
     expected = reference_rates(scene.position, scene.velocity, scene.mass, u)
     sim.step()
@@ -67,7 +71,7 @@ def test_heats_by_the_sum_of_the_paper(gas, precision):
     np.testing.assert_allclose(rate, expected, atol=(1e-4 + 60 * 16 * eps) * scale)
 
 
-@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize("integrator", SHORT_OR_LONG)
 def test_first_law_at_any_step(gas, integrator):
     """Kinetic and internal energy are one sum, to round-off, also where the step is far too long
     for the motion to be right.
@@ -86,6 +90,7 @@ def test_first_law_at_any_step(gas, integrator):
     assert momentum < 1e-12 * np.abs(sim.velocity).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", METHODS)
 def test_order_of_the_internal_energy(gas, integrator):
     """Errors of u at a time fall with the order of the method.
@@ -102,9 +107,12 @@ def test_order_of_the_internal_energy(gas, integrator):
     assert np.log2(coarse / fine) == pytest.approx(METHODS.index(integrator) + 1, abs=0.15)
 
 
-def test_worlds_go_as_alone_and_go_on(gas, tmp_path):
+@pytest.mark.slow
+@pytest.mark.parametrize("integrator", METHODS)
+def test_worlds_go_as_alone_and_go_on(gas, integrator, tmp_path):
     scenes = [gas(60), gas(40, seed=3)]
-    together = equal_alone(simulate, scenes, "cpu", 4)
+    run = functools.partial(simulate, integrator=integrator)
+    together = equal_alone(run, scenes, "cpu", 4)
     together.save(tmp_path / "gas.npz")
     loaded = ps.Simulation.load(tmp_path / "gas.npz", scenes, device="cpu")
     for sim in (together, loaded):
@@ -117,6 +125,7 @@ def test_worlds_go_as_alone_and_go_on(gas, tmp_path):
     assert np.array_equal(together.get("internal_energy"), end)
 
 
+@pytest.mark.slow
 def test_threads_and_graph_agree_bit_for_bit(gas):
     found = []
     for execution, threads in [("graph", 1), ("threads", 1), ("threads", 2)]:
@@ -152,8 +161,7 @@ def test_refuses_what_has_no_energy(cloud, gas):
 
 def test_says_that_energies_fell_below_zero(gas):
     """A cold gas that is torn apart in one step far too long."""
-    scene = gas(viscosity=None)
-    sim = simulate(scene, dt=3.0, substeps=1, integrator="symplectic_euler", watchdog=False)
+    sim = simulate(gas(), dt=3.0, substeps=1, watchdog=False)
     sim.step()
     if not (sim.get("internal_energy") < 0).any():
         pytest.fail("the case is to take energies below 0")
@@ -162,6 +170,7 @@ def test_says_that_energies_fell_below_zero(gas):
         sim.run(1)
 
 
+@pytest.mark.slow
 def test_isothermal_gas(prepared, fluid, cloud):
     x, _, m = cloud(60)
     sim = prepared(fluid(0.4 * x, m=m, equation_of_state=ps.Isothermal(3.0)))

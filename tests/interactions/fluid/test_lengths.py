@@ -113,7 +113,7 @@ def test_plain_rows_find_the_same(count, monkeypatch):
 
 def test_heats_by_the_sum_over_all_pairs():
     scene = cloud(300)
-    sim = simulate(scene, integrator="symplectic_euler", substeps=1, dt=1e-8)
+    sim = simulate(scene, substeps=1, dt=1e-8)
     expected = check(scene, sim)
     sim.step()
     rate = sim.interactions[0].heat.rates[0].numpy()
