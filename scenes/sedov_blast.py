@@ -1,6 +1,6 @@
 """A blast: energy set free at a point of a cold gas drives a sphere of shock before it.
 
-Sedov's solution (1959), in units of the gas's density, the energy and half the box's side: the
+Sedov's solution (1959), in units of the gas's density, the energy and half the cube's side: the
 shock is at R = xi (E t^2 / rho)^(1/5), with xi = 1.151666 for gamma = 5/3, and thins the middle out
 to nothing. SPH with smoothing lengths that follow the density; the energy starts in the few
 particles that one in the middle reaches.
@@ -19,14 +19,14 @@ settings = ps.Settings(dt=0.02, substeps=32, integrator="velocity_verlet")
 
 
 def build(side: int = 24, eta: float = 1.2, spread: float = 1.0) -> ps.Scene:
-    """The gas in its periodic box, with the energy 1 in the middle.
+    """A cube of gas, too cold to move by itself, with the energy 1 in the middle.
 
     Args:
-        side: Particles along a side of the box.
+        side: Particles along a side of the cube.
         eta: Smoothing lengths, in spacings.
         spread: Smoothing length that the energy is spread with, in those of the particles.
     """
-    scene = ps.Scene(periodic=((-1, -1, -1), (1, 1, 1)))
+    scene = ps.Scene()
     spacing = 2.0 / side
     x = ps.sample.box((-1, -1, -1), (1, 1, 1), spacing)
     q = np.linalg.norm(x, axis=1) / (spread * eta * spacing)
@@ -38,8 +38,9 @@ def build(side: int = 24, eta: float = 1.2, spread: float = 1.0) -> ps.Scene:
     )  # fmt: skip
     scene.add_interaction(
         ps.SPH(
-            smoothing_length=ps.AdaptiveSmoothing(eta, largest=0.25),
+            smoothing_length=ps.AdaptiveSmoothing(eta),
             equation_of_state=ps.IdealGas(GAMMA),
+            smoothing="cubic_spline",
             viscosity=ps.ArtificialViscosity(1.0, 2.0),
         )
     )

@@ -97,8 +97,10 @@ def check_blast(side, substeps):
     # Less of it is motion than at the start of no motion: 28 % for gamma = 5/3, less what is
     # smeared where the middle should be empty.
     assert 0.15 < after.kinetic[0] < 0.35
-    # Round-off of a step's forces on either side of the middle, in single precision.
-    assert np.abs(after.momentum).max() < 1e-5
+    # Round-off in single precision of forces that are up to 100, at random in 640 substeps or more
+    # of 1000 particles or more, of which those that are pushed are few at first.
+    assert np.abs(after.momentum).max() < 1e-6
+    assert np.abs(after.angular_momentum).max() < 1e-6
     return errors[-1]
 
 
