@@ -17,8 +17,8 @@ class Explanation(Report):
 
     arrays: bytes per particle of each array of the state. unread: attributes of the particles that
     no part reads, and so have none. lists: one line for each pair list.
-    launches: (owner, kernel, rows) of each launch of a substep; ``conditional`` ones run only
-    when neighbour lists are rebuilt.
+    launches: (owner, kernel, rows) of each launch of a substep; ``conditional`` ones run only where
+    they are needed, as when neighbour lists are rebuilt.
     """
 
     title: str
@@ -37,7 +37,7 @@ class Explanation(Report):
 
     @property
     def launches_per_substep(self) -> int:
-        """Launches of every substep, beside those of a rebuild."""
+        """Launches of every substep, beside those of a rebuild and alike."""
         return len(self.launches)
 
     def __str__(self) -> str:
@@ -48,7 +48,7 @@ class Explanation(Report):
         lines += ["", "pair lists", *([f"  {line}" for line in self.lists] or ["  none"])]
         for heading, launches in (
             (f"a substep: {len(self.launches)} launches", self.launches),
-            ("when neighbour lists are rebuilt", self.conditional),
+            ("where needed, as when neighbour lists are rebuilt", self.conditional),
         ):
             if launches:
                 lines += ["", heading]

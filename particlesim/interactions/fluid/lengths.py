@@ -23,7 +23,7 @@ from .smoothing import SUPPORT
 
 LENGTH = "smoothing_length"  # the array of the state
 LARGEST, SMALLEST = 4.0, 1e-3  # of the largest at the start, and of the largest that there may be
-GROWTH = 1.15  # of a length until its row is made anew, which it is from half of that on
+GROWTH = 1.1  # of a length until its row is made anew, which it is from half of that on
 PASSES = 8  # in a substep; one where nothing has moved, three in motion
 RENEWALS = 60  # of rows at the start, until they reach as far as they are to
 TOLERANCE = {"float32": 1e-5, "float64": 1e-9}  # of ln h
@@ -36,7 +36,7 @@ class AdaptiveSmoothing:
     h fit each other: rho_i = sum_j m_j W(r_ij, h_i), by Newton's steps in every substep. Forces
     know how h follows the density (Springel and Hernquist 2002; Price 2012), so that momentum,
     angular momentum and energy are conserved as with one length. Lengths are the state array
-    ``smoothing_length``.
+    ``smoothing_length``; in a substep none grows by more than a tenth.
 
     Args:
         eta: h in spacings of particles, above 0: 1.2 makes 58 neighbours in three dimensions, 1.6

@@ -46,7 +46,7 @@ class SPH(Evolving):
     with W_ij = W(|x_i - x_j|, h) (Gingold and Monaghan 1977; Monaghan 1992, eq. 3.3). The pressure
     force is the exact gradient of the energy sum_i m_i u(rho_i), so that momentum and angular
     momentum are conserved to round-off and the energy to the integrator's order; viscosity takes
-    energy out, or turns it into heat (:class:`~particlesim.IdealGas`). Coincident particles are
+    energy out, or turns it into heat (:class:`IdealGas`). Coincident particles are
     pushed apart, equally and opposite.
 
     The step is bounded by the time of sound across a smoothing length and by the acceleration
@@ -55,15 +55,17 @@ class SPH(Evolving):
     A run warns of a start whose masses do not make the rest density at their spacing, whose
     smoothing length is below the spacing, or which moves faster than a liquid's sound.
 
-    State arrays ``density`` and ``pressure`` belong to the positions at which the forces were
-    taken last.
+    State arrays ``density`` and ``pressure``, and ``smoothing_length`` of particles' own, belong to
+    the positions at which the forces were taken last.
 
     Args:
         group: The fluid's particles; None: all. Pinned ones count in the sums and stay.
         smoothing_length: h [length], above 0. W has the support 2 h, whichever the function: at
-            a spacing s of particles, h = 2 s makes 268 neighbours, 1.3 s makes 74, s makes 33.
+            a spacing s of particles, h = 2 s makes 268 neighbours, 1.3 s makes 74, s makes 33. Or
+            an :class:`AdaptiveSmoothing`, by which each particle has its own.
         rest_density: rho0 [mass/length^d], where the equation of state asks for it.
-        equation_of_state: :class:`Tait`, :class:`Polytrope` or another ``EquationOfState``.
+        equation_of_state: :class:`Tait`, :class:`Polytrope`, :class:`IdealGas` or another
+            ``EquationOfState``.
         smoothing: ``"wendland_c2"`` (Wendland 1995; does not clump at many neighbours) or
             ``"cubic_spline"`` (Monaghan and Lattanzio 1985; sharper at few).
         viscosity: :class:`ArtificialViscosity` or another ``Viscosity``; None: inviscid.
