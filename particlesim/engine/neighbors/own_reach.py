@@ -44,7 +44,9 @@ class OwnReach:
     def allocate(self, listed: Any, state: State) -> None:
         """Once, before the first rows."""
         self.listed, self.state, model = listed, state, listed.model
-        state[self.size].assign(self.first.astype(model.precision.numpy))
+        sizes, members = state[self.size].numpy().copy(), listed.members_host
+        sizes[members] = self.first[members]
+        state[self.size].assign(sizes)
         self.reach = wp.zeros_like(state[self.size])
         self.most = model.array(self.most_host, wp.float64)
         self.longest = wp.zeros(model.world_count, dtype=wp.float32, device=model.device)

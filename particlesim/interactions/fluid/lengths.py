@@ -184,7 +184,8 @@ class Lengths:
 
     def reset(self, worlds: Sequence[int]) -> None:
         """These worlds are at their start again."""
-        array, rows = self.state[LENGTH], np.isin(self.model.world_of, list(worlds))
+        array = self.state[LENGTH]
+        rows = self.members[np.isin(self.model.world_of[self.members], list(worlds))]
         host = array.numpy().copy()
         host[rows] = self.started[rows]
         array.assign(host)
