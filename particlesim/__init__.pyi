@@ -35,7 +35,14 @@ from .interactions.electrostatics.electrostatics import Electrostatics
 from .interactions.fields.field_force import FieldForce
 from .interactions.fields.poisson import PoissonField
 from .interactions.fields.wave import GridField
-from .interactions.fluid.equations_of_state import EquationOfState, Polytrope, Tait
+from .interactions.fluid.equations_of_state import (
+    EquationOfState,
+    IdealGas,
+    Isothermal,
+    Polytrope,
+    Tait,
+)
+from .interactions.fluid.lengths import AdaptiveSmoothing
 from .interactions.fluid.sph import SPH
 from .interactions.fluid.viscosities import ArtificialViscosity, Viscosity
 from .interactions.grains import HertzianGrains
@@ -56,9 +63,10 @@ from .output.surface import Surface
 from .output.usd.recorder import UsdRecorder
 from .pictures.render.camera import Camera
 from .scene import __version__, sample
+from .scene.constraint_base import ConstraintBase
 from .scene.group import Group
 from .scene.law import Law, law
-from .scene.part import ConstraintBase, Interaction
+from .scene.part import Interaction
 from .scene.scene import Scene
 from .scene.settings import Settings
 from .scene.table import Table
@@ -67,6 +75,7 @@ from .simulation.simulation import Simulation
 
 __all__ = [
     "SPH",
+    "AdaptiveSmoothing",
     "Angles",
     "ArtificialViscosity",
     "Barostat",
@@ -95,9 +104,11 @@ __all__ = [
     "HarmonicBonds",
     "HertzianGrains",
     "History",
+    "IdealGas",
     "Incident",
     "Integrator",
     "Interaction",
+    "Isothermal",
     "Langevin",
     "Law",
     "Ledger",

@@ -1,7 +1,9 @@
 """Two polytropic stars collide and merge.
 
-Units of one star's mass and radius, G = 1. Each star is a polytrope of index 1, P = K rho^2 with
-K = 2 R^2 / pi, whose density is sin(pi r) / (4 r) (Lane-Emden); SPH holds it against its gravity.
+Units of one star's mass and radius, G = 1. Each star is at first a polytrope of index 1,
+P = K rho^2 with K = 2 R^2 / pi, whose density is sin(pi r) / (4 r) (Lane-Emden); SPH holds it
+against its gravity, with smoothing lengths that follow the density. The gas has gamma = 2, so that
+it stays one where nothing heats it, and where the stars meet shocks turn motion into heat.
 """
 
 import numpy as np
@@ -9,7 +11,7 @@ import numpy as np
 import particlesim as ps
 
 frames = 200
-settings = ps.Settings(dt=0.05, substeps=10)
+settings = ps.Settings(dt=0.05, substeps=10, integrator="velocity_verlet")
 
 
 def build(
@@ -30,21 +32,19 @@ def build(
             ball + np.array([side * separation / 2, side * impact / 2, 0.0]),
             velocity=(-side * speed, 0, 0),
             mass=1.0 / len(ball),
+            internal_energy=0.5 * np.sinc(np.linalg.norm(ball, axis=1)),  # K rho
             radius=0.5 * len(ball) ** (-1 / 3),
             group=name,
         )
-    # About 60 neighbours in the mean: support 2 h.
-    h = 0.5 * (60 / len(ball)) ** (1 / 3)
     scene.add_interaction(
         ps.SPH(
-            smoothing_length=h,
-            rest_density=np.pi / 4,
-            equation_of_state=ps.Polytrope(2 / np.pi, 1.0),
+            smoothing_length=ps.AdaptiveSmoothing(1.2),
+            equation_of_state=ps.IdealGas(2.0),
             smoothing="cubic_spline",
             viscosity=ps.ArtificialViscosity(1.0, 2.0),
         )
     )
-    scene.add_interaction(ps.Gravity(G=1.0, softening=0.5 * h))
+    scene.add_interaction(ps.Gravity(G=1.0, softening=len(ball) ** (-1 / 3)))
     return scene
 
 

@@ -15,6 +15,8 @@ NAMES = list(ready_scenes())
 SMALL = {
     "dam_break": {"spacing": 0.05},
     "star_collision": {"count": 150},
+    "sod_tube": {"count": 90},
+    "sedov_blast": {"side": 10},
     "plummer_sphere": {"count": 300},
     "galaxy_collision": {"count": 300, "softening": 0.2},
     "freezing": {"cells": 5},
@@ -37,7 +39,8 @@ def simulate(name, frames, device, settings=None, **options):
 def test_the_ready_scenes_are_all_there():
     expected = (
         "bouncing_block chain dam_break freezing galaxy_collision gas_in_a_box lj_melt "
-        "molten_salt phase_transition pile plummer_sphere polymer_melt spring_lattice "
+        "molten_salt phase_transition pile plummer_sphere polymer_melt sedov_blast sod_tube "
+        "spring_lattice "
         "star_collision three_body triple_pendulum wave_field"
     )
     assert set(expected.split()) <= set(NAMES)

@@ -20,8 +20,9 @@ from ..engine.state import State
 from ..kernels.constraints import constraints as kernels
 from ..kernels.constraints.constraint_force import virial_kernel
 from ..kernels.constraints.projection import BLOCK, project_kernel
+from ..scene.constraint_base import ConstraintBase
 from ..scene.law import law as make_law
-from ..scene.part import ConstraintBase, Part
+from ..scene.part import Part
 from .force import ConstraintForce
 from .limits import constraint_limits
 from .tuples import Tuples, bodies

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import warp as wp
 
 from ..engine.easing import Easing
-from ..scene.part import ConstraintBase
+from ..scene.constraint_base import ConstraintBase
 
 
 class EasedConstraint(ConstraintBase):

@@ -5,14 +5,15 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from .. import validate
+from ..scene.constraint_base import ConstraintBase
 from ..scene.fingerprint import laws_of
-from ..scene.part import ConstraintBase, Interaction, Part
+from ..scene.part import Interaction, Part
 from ..scene.scene import Scene
 from ..scene.settings import Settings
 from ..scene.thermostat import Barostat, Thermostat
@@ -94,18 +95,23 @@ class Loop:
         """Advance by ``dt``: interactions, integration, constraints, velocities."""
         self.observers.begin(dt)
         act(self.integrator, self.integrator.begin, dt)
+        self._go_on("begin", dt)
         self.forces(dt)
         self.follow(dt)
         act(self.integrator, self.integrator.advance, dt)
-        for interaction in self.moving:
-            with owner(interaction.name):
-                act(interaction, interaction.advance, self.state, dt)
+        self._go_on("advance", dt)
         self.constrain(dt, self.settings.iterations)
         act(self.integrator, self.integrator.finish, dt)
         now = self.state, self.neighbors, dt
         for constraint in self.constraints:
             self.observers.act(constraint, FINISH, constraint.finish, *now)
         self.observers.end(dt)
+
+    def _go_on(self, step: str, dt: float) -> None:
+        """What interactions have of their own goes on."""
+        for interaction in self.moving:
+            with owner(interaction.name):
+                act(interaction, getattr(interaction, step), self.state, dt)
 
     def exchange(self, dt: float) -> None:
         """Thermostats change velocities, in the middle of a drift of ``dt``."""
@@ -174,11 +180,13 @@ class Loop:
         left = []
         if known:
             found = [self.state.held(name) for name in LEFT_BY_FORCES if name in self.state]
-            left = [*found, *self.observers.carried()]
+            own = [array for part in self.interactions for array in part.carried()]
+            left = [*found, *own, *self.observers.carried()]
         before = [each.numpy().copy() for each in left]
         self.forces(self.settings.substep)
         if self.neighbors.grow():
             self.forces(self.settings.substep)
+        self._go_on("carry", self.settings.substep)
         keep = np.isin(self.model.world_of, list(known))
         for each, old in zip(left, before, strict=True):
             # Forces that depend on velocity would not come out as they were within the step.
@@ -261,36 +269,3 @@ def _names_velocity(kind: type) -> bool:
         return "velocity" in inspect.getsource(kind)
     except (OSError, TypeError):
         return True
-
-
-class Source(Protocol):
-    """What recorders, histories and pictures read: a simulation has it, and so has its loop."""
-
-    scenes: Sequence[Scene]  # one for each world
-    settings: Settings
-    model: Model
-    state: State
-    neighbors: Neighbors
-    interactions: Sequence[Interaction]  # of all worlds, bound
-    constraints: Sequence[ConstraintBase]
-
-    @property
-    def frame(self) -> int:
-        """Frames since the start."""
-
-    @property
-    def time(self) -> float:
-        """Since the start [s]."""
-
-    def get(self, name: str) -> np.ndarray:
-        """A per-particle array, copied to the host."""
-
-
-class Runner(Source, Protocol):
-    """A source that can be moved on."""
-
-    def step(self) -> None:
-        """Advance by one frame."""
-
-    def reset(self) -> None:
-        """Back to the start."""

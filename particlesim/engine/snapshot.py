@@ -33,7 +33,8 @@ class Snapshot:
     def __init__(self, loop: Loop):
         self.loop = loop
         model, state = loop.model, loop.state
-        skip = TRANSIENT | set(model.attributes) - {"position", "velocity"}
+        evolving = frozenset[str]().union(*(part.evolves for part in loop.parts))
+        skip = TRANSIENT | set(model.attributes) - {"position", "velocity"} - evolving
         if not loop.integrator.carries_forces:
             skip |= {"force"}
         self.arrays: dict[str, wp.array] = {

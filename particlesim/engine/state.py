@@ -28,6 +28,7 @@ FIELDS: dict[str, int | None] = {
     "velocity_error": 3,
     "correction": 3,  # what the constraints have moved x by in this substep
     "previous_position": 3,  # x at the start of the substep, for friction and damping
+    "smoothing_length": None,  # where each particle has its own
     "density": None,
     "pressure": None,
 }

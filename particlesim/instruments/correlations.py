@@ -10,7 +10,7 @@ import warp as wp
 
 from .. import validate
 from ..engine.execution.launch import launch
-from ..engine.loop import Source
+from ..engine.source import Source
 from ..kernels.instruments.distances import distances_kernel
 from ..scene.group import Group
 

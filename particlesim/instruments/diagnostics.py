@@ -12,15 +12,17 @@ import warp as wp
 
 from ..engine.blocks import blocks
 from ..engine.execution.launch import launch
-from ..engine.loop import Loop, Source
+from ..engine.loop import Loop
 from ..engine.model import Model
 from ..engine.report import Report, grid
+from ..engine.source import Source
 from ..kernels.instruments.sums import QUANTITIES, block_sums_kernel
 from ..kernels.precision import FLOAT64
 from ..kernels.tensor import Tensor, matrices
 
 SHOWN = 20  # worlds of a table
 BLOCK = 256  # particles summed by one thread
+MEASURED = ("density", "pressure", "smoothing_length")  # found with the forces
 
 
 @dataclass(frozen=True, repr=False)
@@ -177,10 +179,10 @@ def _measure(sim: Source, forces: Source, potentials: list[np.ndarray] | None) -
 @contextlib.contextmanager
 def undisturbed(sim: Source) -> Iterator[None]:
     """Put back what measuring renews: neighbour rows, whose order decides about rounding, and
-    densities, which belong to the last forces.
+    densities and lengths, which belong to the last forces.
     """
     state = sim.state
-    kept = {name: wp.clone(state[name]) for name in ("density", "pressure") if name in state}
+    kept = {name: wp.clone(state[name]) for name in MEASURED if name in state}
     rows = [
         (each, [(array, wp.clone(array)) for array in each.persistent().values()])
         for each in sim.neighbors.verlet

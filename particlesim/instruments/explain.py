@@ -19,8 +19,8 @@ class Explanation(Report):
 
     arrays: bytes per particle of each array of the state. unread: attributes of the particles that
     no part reads, and so have none. lists: one line for each pair list.
-    launches: (owner, kernel, rows) of each launch of a substep; ``conditional`` ones run only
-    when neighbour lists are rebuilt, or their part is due, as a barostat that scales the box.
+    launches: (owner, kernel, rows) of each launch of a substep; ``conditional`` ones run only where
+    they are needed: when neighbour lists are rebuilt, or their part asks for it.
     """
 
     title: str
@@ -39,7 +39,7 @@ class Explanation(Report):
 
     @property
     def launches_per_substep(self) -> int:
-        """Launches of every substep, beside those of a rebuild."""
+        """Launches of every substep, beside those of a rebuild and alike."""
         return len(self.launches)
 
     def __str__(self) -> str:
@@ -53,7 +53,7 @@ class Explanation(Report):
         for heading, launches in (
             (f"a substep: {len(self.launches)} launches", self.launches),
             ("when neighbour lists are rebuilt", rebuilt),
-            ("when they are due", due),
+            ("where they are needed", due),
         ):
             if launches:
                 lines += ["", heading]

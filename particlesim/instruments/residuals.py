@@ -12,7 +12,7 @@ from ..constraints.boundary import Boundary
 from ..constraints.constraint import Constraint
 from ..constraints.contact import Contact
 from ..engine.execution.launch import launch
-from ..engine.loop import Source
+from ..engine.source import Source
 from ..kernels.constraints.rigid_motion import pose_kernel
 from ..kernels.instruments import residual as kernels
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import validate
-from ..engine.loop import Source
+from ..engine.source import Source
 from ..interactions.fluid.sph import SPH
 from ..scene.group import Group, select
 from ..scene.scene import Scene
@@ -179,7 +179,7 @@ class Surface:
         shared = [len(np.intersect1d(self.rows, members)) for members in self._fluids()]
         if max(shared, default=0) > 0:
             sph = self._sph()[int(np.argmax(shared))]
-            h, density = sph.parameters["smoothing_length"], sph.parameters.get("rest_density")
+            h, density = self._length_of(sph), sph.parameters.get("rest_density")
             if density is None:
                 return h
             volume = float(self.scene.mass[self.rows].mean()) / density
@@ -193,6 +193,12 @@ class Surface:
                 None, "pass smoothing_length=..., or give the particles a radius",
             )  # fmt: skip
         return 2.0 * SPACINGS * float(radius.mean())
+
+    def _length_of(self, sph: SPH) -> float:
+        """That of the fluid; of particles' own the one in the middle."""
+        if sph.adaptive is None:
+            return float(sph.parameters["smoothing_length"])
+        return float(np.median(self._get("smoothing_length")))
 
     def _get(self, name: str) -> np.ndarray:
         """An array of the state for the group's particles."""

@@ -26,6 +26,7 @@ class Part:
 
     requires: frozenset[str] = frozenset()
     host: bool = False
+    evolves: frozenset[str] = frozenset()  # attributes of the particles that it changes in time
     group: Any = None
     peers: Sequence[Any]
     model: Any  # once prepared
@@ -177,11 +178,18 @@ class Interaction(Part):
         """Add forces."""
         raise validate.undefined(self, "apply(self, state, neighbors, dt)")
 
-    def advance(self, state: Any, dt: float) -> None:
-        """What it has of its own goes on, as the particles have: a field, once in a substep.
+    def begin(self, state: Any, dt: float) -> None:
+        """Before a substep's forces: its own comes to where it is foreseen to be with them."""
 
-        ``apply`` may be called at any time, and leaves that as it is.
-        """
+    def advance(self, state: Any, dt: float) -> None:
+        """Its own goes on, as of a field, once in a substep; ``apply`` leaves that as it is."""
+
+    def carry(self, state: Any, dt: float) -> None:
+        """After forces outside a substep: what the next one of ``dt`` begins with."""
+
+    def carried(self) -> list[Any]:
+        """The arrays that ``carry`` writes, a row for each particle."""
+        return []
 
     def presses(self, wall: Part) -> Any:
         """What it exerts on a solid constraint by itself, (worlds, 3); None: nothing."""
@@ -219,82 +227,3 @@ class Interaction(Part):
             name: np.array(row, np.int32 if isinstance(row[0], np.integer) else np.float64)
             for name, row in rows.items()
         }
-
-
-class ConstraintBase(Part):
-    """Acts on positions after integration.
-
-    In a substep: ``begin`` once, then ``project`` in each iteration, in turn with the other
-    constraints, then, when the velocities have followed the projection, ``finish``. Corrections
-    are added to ``state.position`` and, the same amount, to ``state.correction``. What these
-    methods may do is what ``apply`` of an :class:`Interaction` may.
-
-    Example:
-        >>> import warp as wp
-        >>> from particlesim import ConstraintBase, Scene, Settings, Simulation, launch
-        >>> Vectors = wp.array(dtype=wp.vec3)
-        >>> @wp.kernel(module="unique")
-        ... def lift(first: int, height: float, x: Vectors, correction: Vectors):
-        ...     i = first + wp.tid()
-        ...     up = wp.vec3(0.0, wp.max(height - x[i][1], 0.0), 0.0)
-        ...     x[i] = x[i] + up
-        ...     correction[i] = correction[i] + up
-        >>> class Floor(ConstraintBase):
-        ...     def __init__(self, height):
-        ...         self.height = height
-        ...
-        ...     def prepare(self, model, neighbors):
-        ...         self.model = model
-        ...
-        ...     def project(self, state, neighbors, dt):
-        ...         inputs = [self.height, state.position, state.correction]
-        ...         launch(lift, state.count, inputs, self.model.device)
-        >>> scene = Scene()
-        >>> stone = scene.add_particles([(0, 1, 0)], velocity=(3, -4, 0))
-        >>> floor = scene.add_constraint(Floor(0.5))
-        >>> sim = Simulation(scene, Settings(dt=0.5), device="cpu")
-        >>> sim.run(2)
-        >>> sim.position.round(5).tolist(), sim.velocity.round(5).tolist()
-        ([[3.0, 0.5, 0.0]], [[3.0, 0.0, 0.0]])
-    """
-
-    solid = False  # it is what holds a continuum, and has ``wall``
-
-    def wall(self, model: Any, state: Any) -> Any:
-        """A :class:`~particlesim.scene.wall.Wall`, if it is solid; also before ``prepare``."""
-        raise validate.undefined(self, "wall(self, model, state)")
-
-    def begin(self, state: Any, neighbors: Any, dt: float) -> None:
-        """At the start of a substep's projection."""
-
-    def project(self, state: Any, neighbors: Any, dt: float) -> None:
-        """One sweep."""
-        raise validate.undefined(self, "project(self, state, neighbors, dt)")
-
-    def finish(self, state: Any, neighbors: Any, dt: float) -> None:
-        """After the velocities have followed: restitution, breaking."""
-
-    def measure(self, state: Any, energy: Any, virial: Any) -> None:
-        """Add the virial of each particle (float64) in the last substep, on demand."""
-
-    def measure_stress(self, state: Any, energy: Any, stress: Any) -> bool:
-        """The same as a tensor, as of :class:`Interaction`; False: it is not known."""
-        return False
-
-    def read_force(self, part: Part) -> np.ndarray:
-        """See ``Simulation.force``; ``part`` is this, or the one of some worlds' scenes."""
-        raise self._unknown("force")
-
-    def read_broken(self, part: Part) -> np.ndarray:
-        """See ``Simulation.broken``."""
-        raise self._unknown("broken")
-
-    def _unknown(self, what: str) -> ValueError:
-        return validate.fail(
-            f"Simulation.{what}", "constraint", "hold tuples of particles", self.name,
-            "name a Constraint",
-        )  # fmt: skip
-
-    def shapes(self) -> list[dict[str, Any]]:
-        """Static shapes to draw."""
-        return []

@@ -10,14 +10,15 @@ import numpy as np
 
 from .. import validate
 from .bounds import corners, periodic_box
+from .constraint_base import ConstraintBase
 from .group import PALETTE, Color, Group
-from .part import ConstraintBase, Interaction
+from .part import Interaction
 from .thermostat import Barostat, Thermostat
 
 # Names of the engine's own per-particle arrays, which attributes of a scene cannot take.
 RESERVED = frozenset(
     "position velocity mass inverse_mass radius force world density pressure correction image "
-    "previous_position position_error velocity_error time dt x".split()
+    "previous_position position_error velocity_error smoothing_length time dt x".split()
 )
 # What else add_particles takes, and how alike a name may be to these.
 ARGUMENTS = ("velocity", "mass", "radius", "group", "pinned", "color", "triangles", "position")

@@ -27,7 +27,8 @@ from ..interactions.fluid.sph import SPH
 from ..output import checkpoint
 from ..pictures.render.camera import Camera
 from ..pictures.render.image import Image
-from ..scene.part import ConstraintBase, Interaction
+from ..scene.constraint_base import ConstraintBase
+from ..scene.part import Interaction
 from ..scene.scene import Scene
 from ..scene.settings import Settings
 from ..scene.thermostat import Thermostat

@@ -12,7 +12,8 @@ import warp as wp
 
 import particlesim as ps
 from cases.frames import Frame, Quantity
-from particlesim.scene.part import ConstraintBase, Interaction
+from particlesim.scene.constraint_base import ConstraintBase
+from particlesim.scene.part import Interaction
 
 FORCE, STIFFNESS = (1, 1, -2), (0, 1, -2)
 COUNT = 8

@@ -3,7 +3,7 @@
 import numpy as np
 
 import particlesim as ps
-from particlesim.scene.part import ConstraintBase
+from particlesim.scene.constraint_base import ConstraintBase
 
 
 def drifting(count=3, **options):

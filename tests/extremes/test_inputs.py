@@ -31,6 +31,7 @@ def wave(angle: float, level: float):
 
 # Arguments that each part can be made with.
 PARTS = {
+    ps.AdaptiveSmoothing: {"eta": 1.2, "largest": 1.0},
     ps.Angles: {"triples": [(0, 1, 2)], "law": wave, "level": 1.0},
     ps.ArtificialViscosity: {"alpha": 0.1, "beta": 0.2},
     ps.Bonds: {"pairs": [(0, 1)], "law": pull, "strength": 1.0},
@@ -59,6 +60,8 @@ PARTS = {
                  "tolerance": 1e-5},
     ps.HarmonicAngles: {"triples": [(0, 1, 2)], "stiffness": 1.0, "rest_angle": 2.0},
     ps.HarmonicBonds: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0},
+    ps.IdealGas: {"gamma": 1.4},
+    ps.Isothermal: {"sound_speed": 1.0},
     ps.LennardJones: {"epsilon": 1.0, "sigma": 1.0, "cutoff": 2.5},
     ps.GridField: {"lower": (0, 0, 0), "upper": (1, 1, 1), "spacing": 0.1, "speed": 1.0,
                    "density": 1.0, "damping": 0.1},

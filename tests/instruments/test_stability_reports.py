@@ -16,6 +16,8 @@ from particlesim.instruments.stability import StabilityWarning
 SMALL = {
     "dam_break": {"spacing": 0.05},
     "star_collision": {"count": 150},
+    "sod_tube": {"count": 90},
+    "sedov_blast": {"side": 10},
     "plummer_sphere": {"count": 300},
     "galaxy_collision": {"count": 300, "softening": 0.2},
     "freezing": {"cells": 5},

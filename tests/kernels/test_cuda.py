@@ -129,12 +129,18 @@ def damped():
 
 
 def fluid(periodic, **options):
-    scene = particles(periodic=periodic)
+    scene = particles(periodic=periodic, internal_energy=1.0)
     scene.add_interaction(
-        ps.SPH(smoothing_length=1.0, rest_density=1.0,
-               **{"equation_of_state": ps.Tait(10.0), **options})
+        ps.SPH(**{"smoothing_length": 1.0, "rest_density": 1.0, "equation_of_state": ps.Tait(10.0),
+                  **options})
     )  # fmt: skip
     return scene
+
+
+def heated(**options):
+    return fluid(
+        None, equation_of_state=ps.IdealGas(1.4), viscosity=ps.ArtificialViscosity(1.0), **options
+    )
 
 
 def constrained(periodic, *, breaks, bounces):
@@ -175,6 +181,8 @@ SCENES = {
     "periodic_fluid": (
         lambda: fluid(BOX, smoothing="cubic_spline", equation_of_state=ps.Polytrope(1.0, 1.5)), {}
     ),
+    "heated_fluid": (heated, {}),
+    "gas_dynamics": (lambda: heated(smoothing_length=ps.AdaptiveSmoothing()), VERLET),
     "constraints": (lambda: constrained(None, breaks=False, bounces=True), {"ledger": True}),
     "breaking": (lambda: constrained(BOX, breaks=True, bounces=False), {"compensated": False}),
     "tree": (lambda: attracted(0.1), {"opening_angle": 0.5}),
@@ -184,7 +192,7 @@ SCENES = {
 
 EVERY_KERNEL = (
     "forces", "charged", "damped", "periodic_forces", "fluid", "constraints", "breaking",
-    "star_collision", "tree",
+    "gas_dynamics", "star_collision", "tree",
 )  # fmt: skip
 
 

@@ -14,6 +14,8 @@ const int size = block_end[b] - lead < SUPER ? block_end[b] - lead : SUPER;
 const int c0 = cluster_of[q], clusters = (size + CLUSTER - 1) / CLUSTER;
 const real at[3] = {middle[q], middle[supers_n + q], middle[2 * supers_n + q]};
 const real reach[3] = {half[q], half[supers_n + q], half[2 * supers_n + q]};
+// Reaches of slots and supers of their own (OWN) stand in a fourth plane: squares, and as they are.
+const real *far = px + 3 * stride, *far_of = half + 3 * supers_n;
 // A place or displacement, moved by as many boxes as bring displacement d to the nearest image; where
 // there are none it stays as it is, to the last bit.
 auto moved = [&](real place, real d, int n) __attribute__((always_inline)) -> real {
@@ -24,13 +26,14 @@ auto image = [&](real d, int n) __attribute__((always_inline)) -> real { return 
 
 // Own slots in the image next to the middle; a cluster that lacks slots has its first once more.
 // Each sixteen times, for sixteen lanes, which the compiler would otherwise do for every super.
-alignas(64) real own[3][SUPER][SUPER];
+alignas(64) real own[3][SUPER][SUPER], own_far[SUPER];
 for (int k = 0; k < SUPER; ++k) {
     const int first = k / CLUSTER * CLUSTER, s = lead + (k < size ? k : first < size ? first : 0);
     for (int n = 0; n < 3; ++n) {
         const real raw = px[n * stride + s], place = moved(raw, raw - at[n], n);
         for (int l = 0; l < SUPER; ++l) own[n][k][l] = place;
     }
+    own_far[k] = OWN ? far[s] : 0;
 }
 
 // Rows are made here and, once they are whole, go to the pool of their world. One that is longer goes
@@ -173,7 +176,9 @@ for (int other = world_first[w]; other < world_first[w + 1]; ++other) {
                 const int sp = sixteen + l;
                 const real dx = gap(mx[sp] - at[0], hx[sp], 0), dy = gap(my[sp] - at[1], hy[sp], 1);
                 const real dz = gap(mz[sp] - at[2], hz[sp], 2);
-                close[l] = dx * dx + dy * dy + dz * dz <= R * R;
+                real within = R;
+                if (OWN) within = (real)1.0001 * (far_of[sp] > far_of[q] ? far_of[sp] : far_of[q]);
+                close[l] = dx * dx + dy * dy + dz * dz <= within * within;
             }
             unsigned those = bits_of(close) & first_of(run_b[k] - sixteen);
             for (; those; those &= those - 1) {
@@ -186,6 +191,7 @@ for (int other = world_first[w]; other < world_first[w + 1]; ++other) {
 #pragma clang loop vectorize(enable)
                     for (int l = 0; l < SUPER; ++l) {
                         real xj = px[s + l], yj = py[s + l], zj = pz[s + l];
+                        const real far_j = OWN ? far[s + l] : 0;
                         if (!wide) {
                             xj = moved(xj, xj - at[0], 0);
                             yj = moved(yj, yj - at[1], 1);
@@ -200,10 +206,11 @@ for (int other = world_first[w]; other < world_first[w + 1]; ++other) {
                                 real dx = xj - own[0][k][l], dy = yj - own[1][k][l];
                                 real dz = zj - own[2][k][l];
                                 if (wide) dx = image(dx, 0), dy = image(dy, 1), dz = image(dz, 2);
-                                const real r2 = dx * dx + dy * dy + dz * dz;
+                                real r2 = dx * dx + dy * dy + dz * dz;
+                                if (OWN) r2 -= own_far[k] > far_j ? own_far[k] : far_j;
                                 best = u == 0 || r2 < best ? r2 : best;
                             }
-                            hit[t][l] = best < R2;
+                            hit[t][l] = best < (OWN ? 0 : R2);
                         }
                     }
                 };

@@ -34,7 +34,7 @@ class Pool:
     most: wp.array(dtype=wp.int32)  # world -> at most so many in any earlier rows
 
 
-def _look(precision: Precision, periodic: Periodicity) -> wp.Function:
+def _look(precision: Precision, periodic: Periodicity, own: bool) -> wp.Function:
     """``look(q, w, ...)``: make the rows of the clusters of super q."""
     Box, Columns, Supers, Blocks = (
         box_type(precision), columns_type(precision), supers_type(precision),
@@ -43,6 +43,7 @@ def _look(precision: Precision, periodic: Periodicity) -> wp.Function:
     numbers = {
         "SUPER": SUPER, "CLUSTER": CLUSTER, "CLUSTERS": SUPER // CLUSTER, "LEAST": LEAST,
         "ROUNDED": ROUNDED, "HERE": HERE, "RUNS": RUNS, "PERIODIC": [int(on) for on in periodic],
+        "OWN": int(own),
     }  # fmt: skip
     arrays = {
         "px": "x", "middle": "supers.middle", "half": "supers.half",
@@ -75,11 +76,14 @@ def _look(precision: Precision, periodic: Periodicity) -> wp.Function:
 
 
 @functools.cache
-def partners_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
-    """Kernel: for every super of a world that has moved, the rows of its clusters."""
+def partners_kernel(precision: Precision, periodic: Periodicity, own: bool = False) -> wp.Kernel:
+    """Kernel: for every super of a world that has moved, the rows of its clusters.
+
+    ``own``: particles have reaches of their own, in the planes behind the others.
+    """
     real, Box, Blocks = precision.scalar, box_type(precision), blocks_type(precision)
     Columns, Supers = columns_type(precision), supers_type(precision)
-    look = _look(precision, periodic)
+    look = _look(precision, periodic, own)
 
     @functools.partial(register, cpu_only=True)
     def find_partners(

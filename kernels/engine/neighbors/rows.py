@@ -15,11 +15,14 @@ from .renewal import blocks_type, cells_type
 
 
 @functools.cache
-def row_functions(precision: Precision, periodic: Periodicity) -> tuple[wp.Function, wp.Function]:
+def row_functions(
+    precision: Precision, periodic: Periodicity, own: bool
+) -> tuple[wp.Function, wp.Function]:
     """Two functions that append to the row of slot i, which holds n entries.
 
     ``of_range`` looks at the slots from a to b - 1, ``of_cells`` at those in the cells around u,
     the slot's own cell coordinates, as far as ``radius`` cells. Both return how many it then has.
+    With reaches of its ``own`` each particle is looked for as far as the farther of two says.
     """
     vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
     image, Cells = minimum_image(precision, periodic), cells_type(precision)
@@ -30,7 +33,10 @@ def row_functions(precision: Precision, periodic: Periodicity) -> tuple[wp.Funct
     ):  # fmt: skip
         d = image(vec3(x[0, i] - x[0, j], x[1, i] - x[1, j], x[2, i] - x[2, j]), box)
         result = n
-        if j != i and wp.dot(d, d) < reach_squared:
+        within = reach_squared
+        if wp.static(own):
+            within = wp.max(x[3, i], x[3, j])
+        if j != i and wp.dot(d, d) < within:
             if n < room:
                 pairs.index[pairs.row[i] + wp.int64(n) * pairs.entry_stride] = j
             result = n + 1
@@ -63,11 +69,13 @@ def row_functions(precision: Precision, periodic: Periodicity) -> tuple[wp.Funct
 
 
 @functools.cache
-def grid_rows_kernel(precision: Precision, periodic: Periodicity, flexible: bool) -> wp.Kernel:
+def grid_rows_kernel(
+    precision: Precision, periodic: Periodicity, flexible: bool, own: bool = False
+) -> wp.Kernel:
     """Rows of one block's slots from the hash grid of one; ``more``: behind what is in them."""
     vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
     Cells, Blocks = cells_type(precision), blocks_type(precision)
-    _of_range, of_cells = row_functions(precision, periodic)
+    _of_range, of_cells = row_functions(precision, periodic, own)
     cell = cell_function(precision, flexible)
 
     @register
@@ -107,10 +115,10 @@ def grid_rows_kernel(precision: Precision, periodic: Periodicity, flexible: bool
 
 
 @functools.cache
-def direct_rows_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
+def direct_rows_kernel(precision: Precision, periodic: Periodicity, own: bool = False) -> wp.Kernel:
     """Rows by looking at every slot of the own world: fastest for small worlds."""
     real, Box, Blocks = precision.scalar, box_type(precision), blocks_type(precision)
-    of_range, _of_cells = row_functions(precision, periodic)
+    of_range, _of_cells = row_functions(precision, periodic, own)
 
     @register
     def direct_rows(

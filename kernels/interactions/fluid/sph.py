@@ -59,12 +59,13 @@ def own_weight(weight: wp.Function, precision: Precision, data: Any, params: Any
 
 @functools.cache
 def keep_state(
-    own: wp.Function, pressure: wp.Function, sound_speed: wp.Function | None,
+    own: wp.Function, pressure: wp.Function, sound_speed: wp.Function | None, hot: bool,
     precision: Precision, data: Any, params: Any, out: Any,
 ) -> wp.Function:  # fmt: skip
     """Store: density and pressure of the particle, and (m, rho, P/rho^2, c) in slot order.
 
-    ``own(i, d, p)`` is what a particle weighs in its own sum; ``sound_speed`` None leaves c at 0.
+    ``own(i, d, p)`` is what a particle weighs in its own sum; ``sound_speed`` None leaves c at 0;
+    ``hot``: the data hold internal energies u.
     """
     real, one, vec4 = precision.scalar, precision.vector(1), precision.vector(4)
     sounds = sound_speed is not None
@@ -72,10 +73,13 @@ def keep_state(
     def keep(i: int, particle: int, total: one, d: data, p: params, o: out):
         m = d.m[i]
         rho = p.sigma * (total[0] + m * own(i, d, p))  # the sum is over the others
-        pressure_i = pressure(rho, p)
+        u = real(0.0)
+        if wp.static(hot):
+            u = d.u[i]
+        pressure_i = pressure(rho, u, p)
         c = real(0.0)
         if wp.static(sounds):
-            c = sound_speed(rho, pressure_i, p)
+            c = sound_speed(rho, u, pressure_i, p)
         o.state[i] = vec4(m, rho, pressure_i / (rho * rho), c)
         o.rho[particle] = rho
         o.pressure[particle] = pressure_i
@@ -129,6 +133,43 @@ def force_term(
     return Term(function(push), 3, DIRECTIONS[dimension], "fused")
 
 
+def heat_term(
+    slope: wp.Function, viscosity: wp.Function | None, dimension: int, kicks: int,
+    precision: Precision, data: Any, params: Any,
+) -> Term:  # fmt: skip
+    """Term m_j (P_i/rho_i^2 + Pi_ij/2) u_ij . grad_i W_ij of heat, at the mean velocities of kicks.
+
+    Coincident particles are taken as h apart, as by the force.
+    """
+    real, vec3, result = precision.scalar, precision.vec3, precision.vector(kicks)
+    state_of, vector_of = reader(precision, 4), reader(precision, 3)
+    aside = vec3(*DIRECTIONS[dimension])
+    viscous, both = viscosity is not None, kicks == 2
+
+    def warm(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
+        apart = r2 > p.closest_squared
+        side = wp.where(d.slot[i] < d.slot[j], -p.smoothing_length, p.smoothing_length)
+        distance2 = wp.where(apart, r2, p.smoothing_length * p.smoothing_length)
+        along = x_ij + wp.where(apart, real(0.0), side) * aside
+        state_i = state_of(d.state, i)
+        state_j = state_of(d.state, j)
+        stress = state_i[2]
+        if wp.static(viscous):
+            v_ij = vector_of(d.v, i) - vector_of(d.v, j)
+            mean = real(0.5) * (state_i + state_j)
+            term = viscosity(wp.dot(v_ij, x_ij), distance2, mean[1], mean[3], p)
+            stress += real(0.5) * term
+        gradient = (state_j[0] * p.sigma) * slope(wp.sqrt(distance2) * p.inverse_h)
+        g = (gradient * stress * p.inverse_h) * p.inverse_h
+        rate = result()
+        rate[0] = g * wp.dot(vector_of(d.u0, i) - vector_of(d.u0, j), along)
+        if wp.static(both):
+            rate[1] = g * wp.dot(vector_of(d.u1, i) - vector_of(d.u1, j), along)
+        return rate
+
+    return Term(function(warm), kicks)
+
+
 def virial_term(force: Term, precision: Precision, data: Any, params: Any) -> Term:
     """Term x_ij . f_ij / 2, the particle's share of the virial."""
     real, vec3, one = precision.scalar, precision.vec3, precision.vector(1)
@@ -154,13 +195,16 @@ def add_force(precision: Precision, data: Any, params: Any, out: Any) -> wp.Func
 
 @functools.cache
 def keep_measure(
-    energy: wp.Function, precision: Precision, data: Any, params: Any, out: Any
+    energy: wp.Function, hot: bool, precision: Precision, data: Any, params: Any, out: Any
 ) -> wp.Function:
-    """Store: the particle's energy m u(rho) and its share of the virial."""
-    one = precision.vector(1)
+    """Store: the particle's energy m u and its share of the virial."""
+    real, one = precision.scalar, precision.vector(1)
 
     def keep(i: int, particle: int, total: one, d: data, p: params, o: out):
-        u = energy(d.state[i][1], p)
+        u = real(0.0)
+        if wp.static(hot):
+            u = d.u[i]
+        u = energy(d.state[i][1], u, p)
         o.energy[particle] = o.energy[particle] + wp.float64(d.m[i] * u)
         o.virial[particle] = o.virial[particle] + wp.float64(total[0])
 
@@ -169,16 +213,17 @@ def keep_measure(
 
 @functools.cache
 def interpolation_kernel(
-    weight: wp.Function, precision: Precision, periodic: Periodicity, params: Any
+    weight: wp.Function, precision: Precision, periodic: Periodicity, params: Any, own: bool = False
 ) -> wp.Kernel:
     """Kernel: sum_j V_j A_j W(r - r_j, h) and sum_j V_j W(r - r_j, h) at each point r.
 
-    ``samples`` are (V_j A_j, V_j), the volumes being m_j / rho_j.
+    ``samples`` are (V_j A_j, V_j), the volumes being m_j / rho_j; ``sizes`` (1/h_j, sigma/h_j^d)
+    where particles have lengths of their own.
     """
     real, vec3, vec4, Box = (
         precision.scalar, precision.vec3, precision.vector(4), box_type(precision),
     )  # fmt: skip
-    image = minimum_image(precision, periodic)
+    image, vec2 = minimum_image(precision, periodic), precision.vector(2)
 
     @register
     def interpolate(
@@ -189,6 +234,7 @@ def interpolation_kernel(
         parameters: wp.array(dtype=params),
         x: wp.array(dtype=vec3),
         samples: wp.array(dtype=vec4),
+        sizes: wp.array(dtype=vec2),
         points: wp.array(dtype=vec3),
         u: wp.array(dtype=vec3),
         sums_out: wp.array(dtype=vec4),
@@ -202,7 +248,13 @@ def interpolation_kernel(
             x_ij = image(points[k] - x[j], box[world])
             r2 = wp.dot(x_ij, x_ij)
             if r2 < p.cutoff_squared:
-                total += samples[j] * weight(wp.sqrt(r2) * p.inverse_h)
-        sums_out[k] = total * p.sigma
+                r = wp.sqrt(r2)
+                if wp.static(own):
+                    total += samples[j] * (weight(r * sizes[j][0]) * sizes[j][1])
+                else:
+                    total += samples[j] * weight(r * p.inverse_h)
+        if wp.static(not own):
+            total *= p.sigma
+        sums_out[k] = total
 
     return interpolate

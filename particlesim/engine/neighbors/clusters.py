@@ -60,7 +60,9 @@ class ClusterRows:
         self.pools = np.zeros(model.world_count, dtype=np.int64)  # entries
         self.rows = Pool()
         self.made = 0  # times: for as many as was guessed, for those of the start, for more
-        self.planes = wp.zeros((3, listed.count + PADDING), dtype=precision.scalar, device=device)
+        axes = 3 if listed.own is None else 4  # behind the coordinates, reaches
+        size = (axes, listed.count + PADDING)
+        self.planes = wp.zeros(size, dtype=precision.scalar, device=device)
         self.supers = self._supers()
         most = {k: max(64, int(BINS_PER_PARTICLE * blocks[k].count)) for k in self.large}
         self.columns = self._columns(most)
@@ -89,10 +91,9 @@ class ClusterRows:
         result.first = model.array(first, wp.int32)
         begin = np.concatenate([[0], np.cumsum(four)])
         result.cluster = model.array(begin[block_of] + SUPER // CLUSTER * within, wp.int32)
+        size = (len(self.planes), int(first[-1]) + SUPER)
         for name in ("middle", "half"):
-            planes = wp.zeros(
-                (3, int(first[-1]) + SUPER), dtype=model.precision.scalar, device=model.device
-            )
+            planes = wp.zeros(size, dtype=model.precision.scalar, device=model.device)
             setattr(result, name, planes)
         self.super_count = int(first[-1])
         return result
@@ -169,8 +170,10 @@ class ClusterRows:
         slots = self.super_count * SUPER
         inputs = [listed.moved, self.columns, listed.box, self.supers, listed.order, self.planes]
         launch(halve.supers, slots, inputs, device, SUPER)
+        if listed.own is not None:
+            listed.own.spread(self.planes, self.supers, self.super_count)
         launch(
-            partners_kernel(model.precision, model.periodic),
+            partners_kernel(model.precision, model.periodic, listed.own is not None),
             slots,
             [listed.moved, listed.box, listed.struct, self.columns, self.starts, self.supers,
              self.rows, self.planes, listed.pairs, listed.found, listed.overflow],

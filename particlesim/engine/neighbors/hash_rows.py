@@ -40,7 +40,8 @@ class HashRows:
         self.has_direct, self.direct = bool(small.any()), model.array(small, wp.int32)
         self.slot = wp.zeros(count, dtype=wp.int32, device=device)
         self.cell_coordinate = wp.zeros(count, dtype=vec3, device=device)
-        self.planes = wp.zeros((3, count), dtype=real, device=device)
+        axes = 3 if listed.own is None else 4  # behind the coordinates, reaches
+        self.planes = wp.zeros((axes, count), dtype=real, device=device)
         self.grids: dict[int, tuple[wp.HashGrid, Any]] = {}  # by block
         start = listed.x_listed.numpy().astype(np.float64)
         for k in np.nonzero(used & (sizes > 0))[0].tolist():
@@ -113,7 +114,10 @@ class HashRows:
                  self.planes],
                 device,
             )  # fmt: skip
-        make = rows.grid_rows_kernel(model.precision, model.periodic, model.flexible)
+        if listed.own is not None:
+            listed.own.spread(self.planes)
+        own = listed.own is not None
+        make = rows.grid_rows_kernel(model.precision, model.periodic, model.flexible, own)
         for block, _, _ in mine:
             for k, (other, grid, place) in enumerate(mine):
                 thick = listed.skin.first[w]
@@ -131,8 +135,10 @@ class HashRows:
         model, listed = self.model, self.listed
         spread = kernels.sorting_kernels(model.precision).spread
         launch(spread, listed.count, [listed.x_listed, self.planes], model.device)
+        if listed.own is not None:
+            listed.own.spread(self.planes)
         launch(
-            rows.direct_rows_kernel(model.precision, model.periodic),
+            rows.direct_rows_kernel(model.precision, model.periodic, listed.own is not None),
             listed.count,
             [self.direct, listed.box, listed.moved, listed.struct, self.planes, listed.pairs,
              listed.found, listed.overflow],

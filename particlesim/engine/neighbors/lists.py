@@ -17,6 +17,7 @@ from ..model import Model
 from ..state import State
 from .all_pairs import AllPairs
 from .blocks import by_size
+from .own_reach import OwnReach
 from .verlet import VerletList
 
 SHARE = 1.25  # lists are shared up to this ratio of cutoffs: (5/4)^3 is twice the candidates
@@ -37,6 +38,7 @@ class Request:
     leader: np.ndarray
     widest: np.ndarray
     half: list[np.ndarray | None]
+    own: OwnReach | None
     served_by: AllPairs = field(init=False, repr=False)
 
     def meets(self, other: Request) -> np.ndarray:
@@ -82,6 +84,7 @@ class Neighbors:
         *,
         for_constraint: bool = False,
         half: np.ndarray | None = None,
+        own: OwnReach | None = None,
     ) -> AllPairs:
         """The list for these members within ``cutoff`` (one a world; None: all pairs).
 
@@ -89,18 +92,20 @@ class Neighbors:
         are shared when their cutoffs are alike. Where the cutoff is 0 nothing is looked for.
 
         ``half`` is for members of sizes of their own: i and j are looked for within the sum of
-        their halves, (members,), at most half the cutoff.
+        their halves, (members,), at most half the cutoff. ``own`` is for those whose reaches change
+        in time, up to the cutoff; such a list is nobody else's.
         """
         worlds = self.model.world_count
         widest = np.zeros(worlds) if cutoff is None else cutoff.astype(float)
         halves = self._halves(members, half)
-        new = Request(members, cutoff, for_constraint, np.full(worlds, -1), widest, halves)
+        new = Request(members, cutoff, for_constraint, np.full(worlds, -1), widest, halves, own)
         self._choose_leaders(new)
         found = self._fitting(new)
         if found is None:
             found = (AllPairs if cutoff is None else VerletList)(self.model, members)
             self.lists.append(found)
         if isinstance(found, VerletList):
+            found.own = own
             mine = zip(new.half, found.half, strict=True)
             found.half = [theirs if ours is None else ours for ours, theirs in mine]
         found.request(names)
@@ -126,7 +131,7 @@ class Neighbors:
         count = np.bincount(self.model.world_of[new.members], minlength=self.model.world_count)
         missing = (count > 0) & (new.widest > 0 if new.cutoff is not None else True)
         for k, other in enumerate(self.requests):
-            shared = missing & (other.leader == k)
+            shared = missing & (other.leader == k) & (new.own is other.own is None)
             if shared.any():
                 shared &= self._same_members(new, other) & _alike(new, other)
                 new.leader[shared] = k
@@ -150,7 +155,8 @@ class Neighbors:
         for each in self.lists:
             served = [other for other in self.requests if other.served_by is each]
             if (
-                np.array_equal(each.members_host, new.members)
+                new.own is served[0].own is None
+                and np.array_equal(each.members_host, new.members)
                 and (new.cutoff is None) == (served[0].cutoff is None)
                 and not any(new.parts_from(other).any() for other in served)
             ):

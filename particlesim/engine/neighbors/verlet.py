@@ -9,6 +9,7 @@ for each of its blocks.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,8 @@ from .all_pairs import AllPairs
 from .blocks import blocks, blocks_struct
 from .clusters import ClusterRows
 from .hash_rows import HashRows
+from .listed import neighbors_of
+from .own_reach import OwnReach
 from .skin import Skin
 
 DIRECT = 8192  # largest world that CUDA looks through directly; measured
@@ -46,6 +49,7 @@ class VerletList(AllPairs):
         self.cutoff = np.zeros(model.world_count)  # 0: nothing is looked for in that world
         # By world: of particles that differ much in size, half the cutoff of each; else None.
         self.half: list[np.ndarray | None] = [None] * model.world_count
+        self.own: OwnReach | None = None
         self.generation = 0
 
     def _cut(self) -> np.ndarray:
@@ -53,7 +57,11 @@ class VerletList(AllPairs):
         ranges = (self.begin_host, self.end_host)
         cuts = list(blocks(*ranges, self.cutoff, self.half))
         self.blocks = [block for _, of_world, _ in cuts for block in of_world]
-        self.skin = Skin(self.model, np.array([most for *_, most in cuts]), ~self.for_interactions)
+        unit = np.array([most for *_, most in cuts])
+        if self.own is not None:
+            unit = self.own.typical(self.members_host, self.model)
+            self.blocks = [replace(each, own=float(unit[each.world])) for each in self.blocks]
+        self.skin = Skin(self.model, unit, ~self.for_interactions)
         self.struct = blocks_struct(self.model, [of_world for _, of_world, _ in cuts])
         return self.members_host[np.concatenate([order for order, _, _ in cuts])]
 
@@ -63,6 +71,8 @@ class VerletList(AllPairs):
         self._check_box()
         members = self._cut()
         self.members = model.array(members, wp.int32)
+        if self.own is not None:
+            self.own.allocate(self, state)
         # By phase and world, once there are rows; in a phase that does not renew them never.
         renewed = np.array([self.for_interactions, self.for_constraints])
         self.margins_squared = model.array(np.where(renewed, 0.0, np.inf), real)
@@ -118,13 +128,17 @@ class VerletList(AllPairs):
 
     def persistent(self) -> dict[str, wp.array]:
         """What rows are made from, besides what never changes."""
-        boxes = {"box": self.model.numbers(self.box)} if self.model.flexible else {}
-        return {"x": self.x_listed, **boxes, **self.skin.persistent()}
+        kept = {"box": self.model.numbers(self.box)} if self.model.flexible else {}
+        if self.own is not None:
+            kept["reach"] = self.own.reach
+        return {"x": self.x_listed, **kept, **self.skin.persistent()}
 
     def worlds(self, name: str) -> np.ndarray:
         """The world of each row of one of these."""
         if name == "x":
             return self.model.world_of[self.members_host]
+        if name == "reach":
+            return self.model.world_of
         return np.arange(self.model.world_count)
 
     @property
@@ -199,11 +213,15 @@ class VerletList(AllPairs):
         if model.flexible:
             inputs = [self.moved, model.box, self.box]
             launch(boxes_kernel(model.precision), model.world_count, inputs, model.device)
+        if self.own is not None:
+            self.own.take()
         self.skin.choose(state, self.moved)
         self.rebuild()
 
     def rebuild(self) -> None:
         """Make the rows of the worlds marked as moved from ``x_listed``, and unmark them."""
+        if self.own is not None:
+            self.own.set_cutoffs()
         inputs = [self.moved, self.skin.struct, self.struct, self.margins_squared]
         reach = reach_kernel(self.model.precision)
         launch(reach, self.model.world_count, inputs, self.model.device)
@@ -244,6 +262,8 @@ class VerletList(AllPairs):
         least = min((each.cutoff.min() + thick[each.world] for each in looking), default=0.0)
         most = max((each.cutoff.max() + thick[each.world] for each in looking), default=0.0)
         reach = f"{most:g}" if least == most else f"{least:g} to {most:g}"
+        if self.own is not None:
+            reach = f"{self.own.factor:g} times the {self.own.size.replace('_', ' ')}"
         return (
             f"within {reach} of {self.count} particles, {mean:.0f} listed on average, room for "
             f"{self.capacity}, {self.layout.describe()}, for {', '.join(self.users)}"
@@ -252,27 +272,10 @@ class VerletList(AllPairs):
     @property
     def memory(self) -> int:
         own = [self.x_listed, self.index, self.pairs.count, self.pairs.row, self.found,
-               self.pairs.lead, self.pairs.cluster, *self.layout.arrays]  # fmt: skip
+               self.pairs.lead, self.pairs.cluster, *self.layout.arrays,
+               *([] if self.own is None else [self.own.reach])]  # fmt: skip
         return super().memory + sum(a.capacity for a in own)
 
     def neighbors_of(self, particle: int) -> np.ndarray:
         """Particles listed for ``particle``: all within the cutoff, and some in the skin."""
-        order, pairs = self.order.numpy(), self.pairs
-        slot = int(np.nonzero(order == particle)[0][0])
-        cluster = pairs.cluster.numpy()[slot]
-        entries = np.arange(pairs.count.numpy()[cluster])
-        listed = self.index.numpy()[pairs.row.numpy()[cluster] + entries * pairs.entry_stride]
-        return order[listed[self._within(slot, listed)]]
-
-    def _within(self, slot: int, others: np.ndarray) -> np.ndarray:
-        """Which of these slots are within the reach of one; a cluster's row has some beyond it."""
-        members, of = self.members.numpy(), self.struct.of.numpy()
-        x = np.zeros((self.model.particle_count, 3))
-        x[members] = self.x_listed.numpy()
-        world, order = int(self.world.numpy()[slot]), self.order.numpy()
-        d = x[order[others]] - x[order[slot]]
-        length = self.box.numpy()["length"][world].astype(np.float64)
-        d -= np.where(length > 0, length * np.round(d / np.where(length > 0, length, 1.0)), 0.0)
-        first = self.struct.first.numpy()[world]
-        reach = self.blocks[of[slot]].cutoff[of[others] - first] + self.skin.thickness[world]
-        return (others != slot) & ((d**2).sum(axis=1) < reach**2)
+        return neighbors_of(self, particle)

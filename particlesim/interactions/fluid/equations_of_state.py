@@ -38,7 +38,7 @@ class FluidPart:
 
 
 class EquationOfState(FluidPart):
-    """Base of barotropic equations of state P(rho), for those of one's own too.
+    """Base of equations of state P(rho) and P(rho, u), for those of one's own too.
 
     A member sets ``parameters``, a dict of numbers that may differ from world to world, and gives
     three laws, which return numbers and choose by ``wp.where``, ``wp.min`` or ``wp.max``:
@@ -49,7 +49,8 @@ class EquationOfState(FluidPart):
     - ``sound_speed``: c = sqrt(dP/drho) [length/time], which bounds the step.
 
     Each may name ``density``, ``rest_density`` and ``smoothing_length`` of the ``SPH``, and the
-    ``parameters``; ``sound_speed`` may name ``pressure`` too.
+    ``parameters``; ``sound_speed`` may name ``pressure`` too. If one names ``internal_energy``,
+    particles have it as an attribute, and it goes on in time, as of :class:`IdealGas`.
 
     Example:
         >>> @law
@@ -196,3 +197,94 @@ class Polytrope(EquationOfState):
             "constant": validate.number(self.name, "constant", constant, above=0.0),
             "index": validate.number(self.name, "index", index, above=0.0),
         }
+
+
+@law
+def isothermal_pressure(density: float, sound_speed: float):
+    return sound_speed * sound_speed * density
+
+
+@law
+def isothermal_energy(density: float, sound_speed: float):
+    return sound_speed * sound_speed * wp.log(density)
+
+
+@law
+def isothermal_sound_speed(sound_speed: float):
+    return sound_speed
+
+
+class Isothermal(EquationOfState):
+    """A gas of constant temperature, P = c^2 rho, storing u = c^2 ln(rho) per mass.
+
+    u is 0 at a density of 1 in the scene's units: a constant that nothing but sums of u feels.
+
+    Args:
+        sound_speed: c [length/time], above 0.
+
+    Example:
+        >>> Isothermal(sound_speed=340.0).parameters
+        {'sound_speed': 340.0}
+    """
+
+    pressure = isothermal_pressure
+    energy = isothermal_energy
+    sound_speed = isothermal_sound_speed
+
+    def __init__(self, sound_speed: float) -> None:
+        self.parameters = {
+            "sound_speed": validate.number(
+                self.name, "sound_speed", sound_speed, above=0.0, unit="length/time"
+            )
+        }
+
+
+@law
+def ideal_gas_pressure(density: float, internal_energy: float, gamma: float):
+    return (gamma - 1.0) * density * wp.max(internal_energy, 0.0)
+
+
+@law
+def ideal_gas_energy(internal_energy: float):
+    return internal_energy
+
+
+@law
+def ideal_gas_sound_speed(density: float, pressure: float, gamma: float):
+    return wp.sqrt(gamma * pressure / density)
+
+
+class IdealGas(EquationOfState):
+    """P = (gamma - 1) rho u, where u is the internal energy per mass of each particle.
+
+    Particles have it as an attribute, ``add_particles(..., internal_energy=u)``, and the work of
+    pressure and viscosity on them changes it (Monaghan 1992):
+
+        du_i/dt = sum_j m_j (P_i/rho_i^2 + Pi_ij/2) (v_i - v_j) . grad_i W_ij
+
+    so that the sum of kinetic and internal energy stays, to round-off at any step where nothing
+    else acts. The temperature is u times the specific heat. Diagnostics count m u as potential
+    energy. Where a step too long takes u below 0, P is 0 there, and nothing cools it further;
+    the next run warns.
+
+    Args:
+        gamma: Ratio of specific heats, above 1: 5/3 of one atom, 1.4 of two.
+
+    Example:
+        >>> from particlesim import Scene, Settings, Simulation
+        >>> scene = Scene(periodic=((0, None, None), (1, None, None)))
+        >>> x = [(k / 20, 0, 0) for k in range(20)]
+        >>> gas = scene.add_particles(x, mass=1 / 20, internal_energy=2.5)
+        >>> fluid = scene.add_interaction(
+        ...     SPH(gas, smoothing_length=0.1, equation_of_state=IdealGas(1.4), dimension=1))
+        >>> sim = Simulation(scene, Settings(dt=0.01), device="cpu")
+        >>> sim.diagnostics().energy.round(4).tolist()
+        [2.5]
+    """
+
+    pressure = ideal_gas_pressure
+    energy = ideal_gas_energy
+    sound_speed = ideal_gas_sound_speed
+
+    def __init__(self, gamma: float) -> None:
+        self.parameters = {"gamma": validate.number(self.name, "gamma", gamma, above=1.0)}

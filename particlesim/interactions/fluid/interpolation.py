@@ -73,23 +73,28 @@ def _sums(sph: SPH, world: int, slots: slice, where: np.ndarray, samples: np.nda
     x = sph.pairs.fields["position"][slots]
     host = x.numpy().astype(np.float64)
     block = next(each for each in sph.pairs.blocks if each.world == world)
-    grid, cells = grid_over(model, block, float(sph.pairs.reach[world]), host)
+    own, widest = sph.lengths, sph.pairs.reach[world]
+    sizes = wp.empty(0, dtype=precision.vector(2), device=device)
+    if own is not None:
+        sizes, widest = own.size[slots], own.widest(slots)
+    grid, cells = grid_over(model, block, float(widest), host)
     cells.first = 0  # of the slots at hand
     points = model.array(model.wrapped(where, world)[0], precision.vec3)
     # Points out of reach look into the outermost cells, so that cell numbers stay small.
-    reach = 1.1 * sph.pairs.reach[world]
+    reach = 1.1 * widest
     near = np.clip(points.numpy(), host.min(axis=0) - reach, host.max(axis=0) + reach)
     to_cells = cell_coordinates_kernel(precision)
     u_particles, u_points = wp.empty_like(x), wp.empty_like(points)
     launch(to_cells, len(x), [cells, x, u_particles], device)
     launch(to_cells, len(near), [cells, model.array(near, precision.vec3), u_points], device)
     grid.build(u_particles, 1.0)
-    kernel = kernels.interpolation_kernel(sph.weight, precision, model.periodic, sph.Params)
+    kinds = precision, model.periodic, sph.Params
+    kernel = kernels.interpolation_kernel(sph.weight, *kinds, own is not None)
     sums = wp.zeros(len(points), dtype=precision.vector(4), device=device)
     launch(
         kernel, len(points),
-        [grid.id, world, model.box, sph.params, x, model.array(samples, sums.dtype), points,
-         u_points, sums],
+        [grid.id, world, model.box, sph.params, x, model.array(samples, sums.dtype), sizes,
+         points, u_points, sums],
         device,
     )  # fmt: skip
     return sums.numpy().astype(np.float64)

@@ -33,7 +33,8 @@ def fluid_limits(part: Any, probe: Probe) -> list[Limit]:
         return []
     columns = part.columns(part.parameters)
     each = {name: values[probe.model.world_of[rows]] for name, values in columns.items()}
-    h, c = each["smoothing_length"], part.sound_speeds(probe)
+    c = part.sound_speeds(probe)
+    h = each["smoothing_length"] = part.smoothing_lengths(rows)
     omega = c * steepest(part.smoothing, part.dimension) / h
     gamma = _damping_rates(part, probe, each, c)
     k = int(np.argmax(gamma + np.sqrt(gamma**2 + 4.0 * omega**2)))  # by either integrator

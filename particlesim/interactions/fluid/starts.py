@@ -8,10 +8,12 @@ import numpy as np
 import warp as wp
 
 from .equations_of_state import Tait
+from .heat import ENERGY
 
 # Parts of the rest density between which that of a start lies whose masses fit. Free surfaces halve
 # it there, so what is dense is looked at: of a film of two layers nothing else is left.
 LEAST_DENSE, MOST_DENSE, DENSE = 0.4, 1.4, 90
+MANY = 0.02  # of the particles may have the largest smoothing length
 # Of its density, what a particle makes by itself, in the median: at a spacing of h it is 0.4.
 ALONE, NOBODY = 0.6, 0.999
 
@@ -23,11 +25,41 @@ def complaint(fluid: Any) -> str:
         return ""
     model, world = fluid.model, fluid.model.world_of[members]
     columns = {name: column[world] for name, column in fluid.columns(fluid.parameters).items()}
-    h = columns["smoothing_length"]
+    h = columns["smoothing_length"] = fluid.smoothing_lengths(members)
     return (
-        model.unresolved(fluid.name, "smoothing_length", h, members)
+        _of_energy(fluid, members)
+        or model.unresolved(fluid.name, "smoothing_length", h, members)
+        or _of_lengths(fluid)
         or _of_density(fluid, members, columns)
         or _of_speed(fluid, members, columns)
+    )
+
+
+def _of_energy(fluid: Any, members: np.ndarray) -> str:
+    """The start is one of a run, perhaps of one that went before."""
+    if not fluid.hot:
+        return ""
+    u = fluid.state[ENERGY].numpy()[members]
+    if not (u < 0).any():
+        return ""
+    return (
+        f"{fluid.name}: {ENERGY} must be at least 0 [length^2/time^2], got {u.min():.4g} in "
+        f"particle {members[u.argmin()]}, and below 0 in {(u < 0).sum()} of {len(u)}, whose "
+        "pressure is 0; give a shorter substep."
+    )
+
+
+def _of_lengths(fluid: Any) -> str:
+    """Some that fly off by themselves may well have the largest length."""
+    if fluid.lengths is None:
+        return ""
+    bound = fluid.lengths.at_bound()
+    if bound.mean() <= MANY:
+        return ""
+    return (
+        f"{fluid.name}: largest must be above the smoothing lengths that densities ask for "
+        f"[length], got {fluid.lengths.most.max():.4g}, which {bound.sum()} of {len(bound)} "
+        "particles have; give AdaptiveSmoothing a larger one."
     )
 
 

@@ -16,8 +16,9 @@ from ...engine.state import State
 from ...kernels.interactions.fluid import images
 from ...kernels.interactions.fluid import walls as kernels
 from ...kernels.interactions.fluid.sph import DIRECTIONS, keep_state
+from ...scene.constraint_base import ConstraintBase
 from ...scene.group import select
-from ...scene.part import ConstraintBase, Part
+from ...scene.part import Part
 from ..pair_loop import PairLoop
 
 MOST = 4  # places of walls: each doubles the images
@@ -45,6 +46,9 @@ class Walls:
     most by a spacing, and comes back slowly, as overlaps of contacts do: a tank that is no whole
     number of spacings wide does not burst.
 
+    A fluid whose heat or smoothing lengths are its particles' own sees none: boundaries hold such
+    particles by their radius alone.
+
     Sides of boundaries take places: the three axes of a box one each, every other boundary one. Of
     more than four places walls share the last, and there a particle sees the nearest.
 
@@ -56,7 +60,8 @@ class Walls:
     def __init__(self, fluid: Any, model: Model):
         self.fluid, self.model = fluid, model
         kinds = zip(*(scene.constraints for scene in model.scenes), strict=True)
-        bound = [peers[0].bind(peers) for peers in kinds if peers[0].solid]
+        mirrored = fluid.adaptive is None and not fluid.hot
+        bound = [peers[0].bind(peers) for peers in kinds if peers[0].solid and mirrored]
         held = [(part, _held(model, fluid, part)) for part in bound]
         self.held = [(part, flags) for part, flags in held if flags.any()]
         peers = [peer for part, _ in self.held for peer in part.peers]
@@ -159,7 +164,7 @@ class Walls:
         near = kernels.near_kernel(precision, self.total, fluid.Params)
         launch(near, pairs.rows, [pairs.pairs, fluid.params, self.struct], device)
 
-    def sum_density(self, plain: Pass, laws: tuple[Any, Any]) -> None:
+    def sum_density(self, plain: Pass, laws: tuple[Any, ...]) -> None:
         """The pass of densities, of which ``plain`` is that far from walls."""
         if not self:
             plain.loop.sum(*plain[1:])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ... import validate
-from ...engine.loop import Source
+from ...engine.source import Source
 from ...instruments.diagnostics import measure, undisturbed
 from ...instruments.residuals import residuals
 from ...interactions.fluid.sph import SPH

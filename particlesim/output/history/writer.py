@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ... import validate
-from ...engine.loop import Source
+from ...engine.source import Source
 from .. import files
 from .sample import Observed, sample
 

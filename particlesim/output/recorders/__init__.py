@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import validate
-from ...engine.loop import Source
+from ...engine.source import Source
 from .base import ParticleRecorder, Recorder
 
 # Suffix to module, in output, and class. A module is imported when its first file is opened.

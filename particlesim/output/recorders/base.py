@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ... import validate
-from ...engine.loop import Source
+from ...engine.source import Source
 from ...engine.state import OF_WORLDS
 from .. import files
 from ..fields import ParticleFields

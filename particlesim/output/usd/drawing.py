@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ... import validate
-from ...engine.loop import Source
+from ...engine.source import Source
 from ...interactions.fluid.sph import SPH
 from ...scene.group import Group, select
 from ...scene.scene import Scene

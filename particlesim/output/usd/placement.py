@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ... import validate
-from ...engine.loop import Source
+from ...engine.source import Source
 from ...scene.scene import Scene
 
 GRID_GAP = 0.2  # between worlds, in parts of the largest

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...engine.loop import Source
+from ...engine.source import Source
 from ..fields import ParticleColors
 from ..recorders.base import Recorder
 from .drawing import Drawing

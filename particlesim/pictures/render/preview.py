@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ... import validate
-from ...engine.loop import Source
+from ...engine.source import Source
 from ...output import files
 from .camera import Camera
 from .geometry import Geometry

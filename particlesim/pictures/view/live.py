@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from ...engine.loop import Runner
+from ...engine.source import Runner
 from ...output.usd.recorder import UsdRecorder
 from ...output.usd.writing.writer import UsdWriter
 from .footage import Footage

@@ -12,6 +12,8 @@ from .judge import Row, whole
 SMALL = {
     "dam_break": {"spacing": 0.06},
     "star_collision": {"count": 120},
+    "sod_tube": {"count": 90},
+    "sedov_blast": {"side": 10},
     "plummer_sphere": {"count": 240},
     "galaxy_collision": {"count": 240, "softening": 0.2},
     "freezing": {"cells": 4},

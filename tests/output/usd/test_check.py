@@ -18,6 +18,8 @@ from .stages import COUNT, FRAMES, PLANT, build, vectors
 SMALL = {
     "dam_break": {"spacing": 0.1},
     "star_collision": {"count": 50},
+    "sod_tube": {"count": 90},
+    "sedov_blast": {"side": 10},
     "plummer_sphere": {"count": 100},
     "galaxy_collision": {"count": 100, "softening": 0.2},
     "freezing": {"cells": 4},

@@ -1,0 +1,122 @@
+"""What a fluid has of its own that changes in time: heat, smoothing lengths, slack of walls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ... import validate
+from ...engine.model import Model
+from ...engine.state import State
+from ...scene.part import Interaction, Part
+from .heat import ENERGY, Heat
+from .lengths import LENGTH, AdaptiveSmoothing, Lengths
+from .smoothing import SUPPORT, Smoothing
+from .walls import Walls
+
+
+class Evolving(Interaction):
+    """The base of a fluid: each of both where it was asked for."""
+
+    model: Model
+    state: State
+    hot: bool
+    dimension: int
+    smoothing: Smoothing
+    adaptive: AdaptiveSmoothing | None = None
+    heat: Heat | None = None  # once attached
+    lengths: Lengths | None = None  # once prepared
+    walls: Walls
+
+    def sum_density(self, state: State, sounds: bool = False) -> None:
+        """Density and pressure at the present positions."""
+        raise validate.undefined(self, "sum_density(self, state, sounds)")
+
+    def keep_heat(self) -> None:
+        """It has an internal energy."""
+        self.requires |= {ENERGY, "inverse_mass"}
+        self.evolves = frozenset({ENERGY})
+        self.reads_velocity = self.conservative = True
+
+    def take_length(self, given: Any) -> dict[str, float]:
+        """The parameter that smoothing lengths follow from."""
+        if isinstance(given, AdaptiveSmoothing):
+            self.adaptive, self.cutoff = given, SUPPORT * (given.largest or np.inf)
+            self.requires |= {LENGTH}
+            return {"eta": given.eta}
+        h = validate.number(self.name, LENGTH, given, above=0.0, unit="length")
+        self.cutoff = SUPPORT * h
+        return {LENGTH: h}
+
+    def check_range(self, h: np.ndarray, closest_squared: np.ndarray) -> None:
+        """Powers of h must be normal numbers of the precision."""
+        limits = np.finfo(self.model.precision.numpy)
+        with np.errstate(divide="ignore", over="ignore", under="ignore"):
+            sigma = self.smoothing.sigma / h**self.dimension
+        for power in (sigma, closest_squared):
+            bad = ~((power > limits.tiny) & (power < limits.max))
+            if bad.any():
+                raise validate.fail(
+                    self.name, "smoothing_length",
+                    f"have h^2 and h^-{self.dimension} within {limits.dtype}",
+                    float(h[np.argmax(bad)]),
+                    "choose another unit of length, or precision=\"float64\"",
+                )  # fmt: skip
+
+    def begin(self, state: State, dt: float) -> None:
+        if self.lengths is not None:
+            self.lengths.reach.flag()
+        if self.heat is not None:
+            self.heat.begin(dt)
+
+    def advance(self, state: State, dt: float) -> None:
+        if self.heat is not None:
+            self.heat.advance(dt)
+        if self.walls:
+            self.walls.ease(dt)
+
+    def carry(self, state: State, dt: float) -> None:
+        if self.heat is not None:
+            self.heat.carry(dt)
+
+    def carried(self) -> list[wp.array]:
+        return [] if self.heat is None else self.heat.carried()
+
+    def persistent(self) -> dict[str, wp.array]:
+        kept = {} if self.heat is None else self.heat.persistent()
+        return {**kept, **self.walls.easing.persistent()} if self.walls else kept
+
+    def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
+        return self.walls.worlds(name) if name == "slack" else super().worlds(name, array)
+
+    def reset(self, worlds: Sequence[int]) -> None:
+        self.forget(self.persistent(), worlds)
+        if self.lengths is not None:
+            self.lengths.reset(worlds)
+        if self.walls:
+            self.walls.easing.mark(worlds)
+
+    def placed(self, worlds: Iterable[int]) -> None:
+        if self.lengths is not None:
+            self.lengths.settle(list(worlds))
+        if self.walls:
+            self.walls.easing.mark(worlds)
+
+    def presses(self, wall: Part) -> np.ndarray | None:
+        return self.walls.pressed(wall) if self.walls else None
+
+    def smoothing_lengths(self, rows: np.ndarray) -> np.ndarray:
+        """h of these members at the last forces [length]."""
+        if self.lengths is not None:
+            return self.state[LENGTH].numpy()[rows].astype(np.float64)
+        return self.columns({LENGTH: None})[LENGTH][self.model.world_of[rows]]
+
+    def look_at_density(self, state: State) -> None:
+        """Without changing what the next substep starts from."""
+        kept = None if self.lengths is None else wp.clone(state[LENGTH])
+        self.sum_density(state)
+        if kept is not None:
+            wp.copy(state[LENGTH], kept)
