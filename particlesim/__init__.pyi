@@ -36,6 +36,11 @@ from .interactions.fields.field_force import FieldForce
 from .interactions.fields.poisson import PoissonField
 from .interactions.fields.wave import GridField
 from .interactions.fluid.equations_of_state import EquationOfState, Polytrope, Tait
+from .interactions.fluid.smoothing.gaussian import Gaussian
+from .interactions.fluid.smoothing.mueller import MuellerViscosity, Poly6, Spiky
+from .interactions.fluid.smoothing.smoothing_function import SmoothingFunction
+from .interactions.fluid.smoothing.splines import CubicSpline, QuinticSpline
+from .interactions.fluid.smoothing.wendland import WendlandC2, WendlandC4, WendlandC6
 from .interactions.fluid.sph import SPH
 from .interactions.fluid.viscosities import ArtificialViscosity, Viscosity
 from .interactions.grains import HertzianGrains
@@ -77,6 +82,7 @@ __all__ = [
     "ConstraintForce",
     "Contact",
     "Coulomb",
+    "CubicSpline",
     "Dihedrals",
     "Distance",
     "Drag",
@@ -84,6 +90,7 @@ __all__ = [
     "EquationOfState",
     "FENEBonds",
     "FieldForce",
+    "Gaussian",
     "Gravity",
     "GridField",
     "Group",
@@ -101,22 +108,27 @@ __all__ = [
     "Measured",
     "Mie",
     "Morse",
+    "MuellerViscosity",
     "PairForce",
     "PairPotential",
     "PairSum",
     "ParticleForce",
     "PlaneBoundary",
     "PoissonField",
+    "Poly6",
     "Polytrope",
     "Profile",
+    "QuinticSpline",
     "RadialDistribution",
     "Scene",
     "Settings",
     "Simulation",
     "SimulationError",
     "SimulationWarning",
+    "SmoothingFunction",
     "SoftSphere",
     "SphereBoundary",
+    "Spiky",
     "Springs",
     "Stability",
     "StabilityWarning",
@@ -131,6 +143,9 @@ __all__ = [
     "UsdRecorder",
     "VelocityRescaling",
     "Viscosity",
+    "WendlandC2",
+    "WendlandC4",
+    "WendlandC6",
     "Yukawa",
     "__version__",
     "launch",

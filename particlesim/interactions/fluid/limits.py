@@ -9,7 +9,7 @@ import numpy as np
 
 from ...engine.limit import Limit
 from ...engine.probe import Probe
-from .smoothing import SUPPORT, Smoothing
+from .smoothing.smoothing_function import Smoothing
 from .viscosities import ArtificialViscosity
 
 ACCELERATION = 0.25
@@ -80,7 +80,7 @@ def steepest(smoothing: Smoothing, dimension: int) -> float:
         shell = 2.0 * np.pi * q * np.cos(angles[..., None] * np.cos(turn)).mean(axis=-1)
     else:
         shell = 4.0 * np.pi * q**2 * np.sinc(angles / np.pi)
-    transform = (shell * w).sum(axis=1) * SUPPORT / POINTS
+    transform = (shell * w).sum(axis=1) * smoothing.support / POINTS
     return float(np.abs(WAVENUMBERS * transform).max())
 
 
@@ -88,19 +88,17 @@ def steepest(smoothing: Smoothing, dimension: int) -> float:
 def damping(smoothing: Smoothing, dimension: int) -> float:
     """D of gamma = D (alpha c + 2 beta mu) / h, an upper bound by Gershgorin's circles.
 
-    A pair that approaches damps v_ij along x_ij at the rate m h (alpha c + 2 beta mu) |W'| / (rho
-    r). Summed over all neighbours, 1/d of each along a direction, twice for the row of the matrix:
-    D = 2/d int |W'| / r d^dx h^2, which by parts is an integral over W itself.
+    A pair that approaches damps v_ij along x_ij at the rate m h (alpha c + 2 beta mu) |W'| r / (rho
+    (r^2 + 0.01 h^2)). Summed over all neighbours, 1/d of each along a direction, twice for the row
+    of the matrix: D = 2/d int |W'| r / (r^2 + 0.01 h^2) d^dx h^2.
     """
     q, w = _samples(smoothing)
     surface = {1: 2.0, 2: 2.0 * np.pi, 3: 4.0 * np.pi}[dimension]
-    slope = np.abs(np.gradient(w, q))
-    return float(
-        2.0 / dimension * surface * (slope * q ** (dimension - 2)).sum() * SUPPORT / POINTS
-    )
+    rate = np.abs(np.gradient(w, q)) * q**dimension / (q**2 + 0.01)
+    return float(2.0 / dimension * surface * rate.sum() * smoothing.support / POINTS)
 
 
 def _samples(smoothing: Smoothing) -> tuple[np.ndarray, np.ndarray]:
     """Midpoints q and W h^d there."""
-    q = (np.arange(POINTS) + 0.5) * SUPPORT / POINTS
-    return q, smoothing.sigma * np.array([float(smoothing.weight(float(each))) for each in q])
+    q = (np.arange(POINTS) + 0.5) * smoothing.support / POINTS
+    return q, smoothing.sigma * smoothing.at(q)

@@ -20,7 +20,7 @@ from ...scene.part import Interaction
 from ..pair_loop import PairLoop
 from .equations_of_state import EquationOfState
 from .limits import fluid_limits
-from .smoothing import SMOOTHING, SUPPORT
+from .smoothing import SmoothingFunction, summable
 from .starts import complaint
 from .viscosities import Viscosity
 
@@ -37,7 +37,7 @@ COINCIDENT = 1e-6  # closer than this, in parts of h, particles count as coincid
 class SPH(Interaction):
     r"""A barotropic fluid: density by summation, symmetric pressure force, viscosity.
 
-        rho_i = sum_j m_j W_ij                    (over all j within 2 h, i itself included)
+        rho_i = sum_j m_j W_ij                    (over all j in reach, i itself included)
         F_ij = -m_i m_j (P_i/rho_i^2 + P_j/rho_j^2 + Pi_ij) grad_i W_ij
 
     with W_ij = W(|x_i - x_j|, h) (Gingold and Monaghan 1977; Monaghan 1992, eq. 3.3). The pressure
@@ -56,12 +56,14 @@ class SPH(Interaction):
 
     Args:
         group: The fluid's particles; None: all. Pinned ones count in the sums and stay.
-        smoothing_length: h [length], above 0. W has the support 2 h, whichever the function: at
-            a spacing s of particles, h = 2 s makes 268 neighbours, 1.3 s makes 74, s makes 33.
+        smoothing_length: h [length], above 0. Where W ends at 2 h, as most functions do, and at a
+            spacing s of particles, h = 2 s makes 268 neighbours, 1.3 s makes 74, s makes 33.
         rest_density: rho0 [mass/length^d], where the equation of state asks for it.
         equation_of_state: :class:`Tait`, :class:`Polytrope` or another ``EquationOfState``.
-        smoothing: ``"wendland_c2"`` (Wendland 1995; does not clump at many neighbours) or
-            ``"cubic_spline"`` (Monaghan and Lattanzio 1985; sharper at few).
+        smoothing: W, a :class:`SmoothingFunction` or the name of a ready one: ``"wendland_c2"``
+            (does not clump at many neighbours), ``"wendland_c4"``, ``"wendland_c6"``,
+            ``"cubic_spline"`` (sharper at few), ``"quintic_spline"``, ``"gaussian"``, ``"poly6"``,
+            ``"spiky"``.
         viscosity: :class:`ArtificialViscosity` or another ``Viscosity``; None: inviscid.
         dimension: d of the normalisation of W: 3; 2 for scenes in a plane, whose density is a mass
             per area; 1 for scenes on a line. The plane is x-y and the line x where coincident
@@ -87,14 +89,13 @@ class SPH(Interaction):
 
     def __init__(
         self, group: Any = None, *, smoothing_length: float, equation_of_state: EquationOfState,
-        rest_density: float | None = None, smoothing: str = "wendland_c2",
+        rest_density: float | None = None, smoothing: str | SmoothingFunction = "wendland_c2",
         viscosity: Viscosity | None = None, dimension: int = 3,
     ):  # fmt: skip
         self.group = group
         h = validate.number(
             self.name, "smoothing_length", smoothing_length, above=0.0, unit="length"
         )
-        self.cutoff = SUPPORT * h
         self.equation_of_state = _of_kind(
             self.name, "equation_of_state", equation_of_state, EquationOfState,
             "Tait(sound_speed)",
@@ -104,13 +105,12 @@ class SPH(Interaction):
         self.conservative = viscosity is None
         if viscosity is not None:
             _of_kind(self.name, "viscosity", viscosity, Viscosity, "ArtificialViscosity(0.05)")
-        validate.choice(self.name, "smoothing", smoothing, SMOOTHING)
-        functions = SMOOTHING[smoothing]
-        if dimension not in functions:
+        if dimension not in (1, 2, 3):
             raise validate.fail(
                 self.name, "dimension", "be 1, 2 or 3", dimension, "choose one of these"
             )
-        self.dimension, self.smoothing = dimension, functions[dimension]
+        self.dimension, self.smoothing = dimension, summable(self.name, smoothing, dimension)
+        self.cutoff = self.smoothing.support * h
         self.parameters: dict[str, Any] = {"smoothing_length": h}
         if rest_density is not None:
             self.parameters["rest_density"] = validate.number(
@@ -140,7 +140,7 @@ class SPH(Interaction):
     def kind(self) -> tuple[Any, ...]:
         parts = [self.equation_of_state, *([self.viscosity] if self.viscosity else [])]
         laws = [law.func for part in parts for law in part.laws.values()]
-        return (type(self), *laws, self.smoothing, self.dimension, tuple(self.parameters))
+        return (type(self), *laws, self.smoothing.kind, self.dimension, tuple(self.parameters))
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
@@ -152,7 +152,8 @@ class SPH(Interaction):
         columns["inverse_h"] = 1.0 / h
         with np.errstate(divide="ignore", over="ignore", under="ignore"):
             columns["sigma"] = self.smoothing.sigma / h**self.dimension
-        columns |= {"cutoff_squared": (SUPPORT * h) ** 2, "closest_squared": (COINCIDENT * h) ** 2}
+        reach = self.smoothing.support * h
+        columns |= {"cutoff_squared": reach**2, "closest_squared": (COINCIDENT * h) ** 2}
         self._check_range(columns)
         model.fits(self.name, {name: columns[name] for name in self.parameters})
         self.Params, self.params = model.parameters("FluidParameters", columns)
