@@ -40,7 +40,9 @@ OFTEN = ("cubic_spline", "wendland_c2")
     ],
 )
 def test_sound_limit_is_that_of_the_fluid_itself(smoothing):
-    sim = simulation(fluid(smoothing=smoothing), precision="float64")
+    # What is narrow has as many neighbours that count at a larger h.
+    ratio = 1.6 if smoothing in ("wendland_c6", "spiky") else 1.3
+    sim = simulation(fluid(ratio=ratio, smoothing=smoothing), precision="float64")
     sph = sim.interactions[0]
     sound = sim.stability().binding
     assert sound.kind == "sound"
@@ -50,7 +52,7 @@ def test_sound_limit_is_that_of_the_fluid_itself(smoothing):
     # The continuum's wave of largest omega against the lattice's: 74 neighbours, within 5 %.
     assert sound.dt == pytest.approx(true.dt, rel=0.05)
     assert sound.dt == pytest.approx(
-        2 * 0.13 / (c.max() * steepest(SMOOTHING[smoothing].in_dimension(3), 3)), rel=1e-6
+        2 * 0.1 * ratio / (c.max() * steepest(SMOOTHING[smoothing].in_dimension(3), 3)), rel=1e-6
     )
 
 
