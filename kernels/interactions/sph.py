@@ -1,4 +1,4 @@
-"""Smoothed particle hydrodynamics: terms of pairs, what is kept of their sums, interpolation.
+"""Smoothed particle hydrodynamics: terms of pairs, and what is kept of their sums.
 
 Two passes over one neighbour list. The first sums the density and keeps each particle's state in
 slot order; the second sums the force from the states of both particles:
@@ -16,8 +16,8 @@ from typing import Any
 
 import warp as wp
 
-from ..engine.loops import Periodicity, Term, box_type, minimum_image, reader
-from ..precision import Precision, function, function_from_source, register
+from ..engine.loops import Term, reader
+from ..precision import Precision, function, function_from_source
 from ..warp_internals import arguments as arguments_of
 
 # Where coincident particles are pushed along, within the line or plane of a lower dimension.
@@ -140,44 +140,3 @@ def keep_measure(
         o.virial[particle] = o.virial[particle] + wp.float64(total[0])
 
     return function(keep)
-
-
-@functools.cache
-def interpolation_kernel(
-    weight: wp.Function, precision: Precision, periodic: Periodicity, params: Any
-) -> wp.Kernel:
-    """Kernel: sum_j V_j A_j W(r - r_j, h) and sum_j V_j W(r - r_j, h) at each point r.
-
-    ``samples`` are (V_j A_j, V_j), the volumes being m_j / rho_j.
-    """
-    real, vec3, vec4, Box = (
-        precision.scalar, precision.vec3, precision.vector(4), box_type(precision),
-    )  # fmt: skip
-    image = minimum_image(precision, periodic)
-
-    @register
-    def interpolate(
-        first: int,
-        grid: wp.uint64,
-        world: int,
-        box: wp.array(dtype=Box),
-        parameters: wp.array(dtype=params),
-        x: wp.array(dtype=vec3),
-        samples: wp.array(dtype=vec4),
-        points: wp.array(dtype=vec3),
-        u: wp.array(dtype=vec3),
-        sums_out: wp.array(dtype=vec4),
-    ):
-        k = first + wp.tid()
-        p = parameters[world]
-        total = vec4()
-        j = int(0)
-        candidates = wp.hash_grid_query(grid, u[k], real(1.0))
-        while wp.hash_grid_query_next(candidates, j):
-            x_ij = image(points[k] - x[j], box[world])
-            r2 = wp.dot(x_ij, x_ij)
-            if r2 < p.cutoff_squared:
-                total += samples[j] * weight(wp.sqrt(r2) * p.inverse_h)
-        sums_out[k] = total * p.sigma
-
-    return interpolate

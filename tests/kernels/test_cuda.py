@@ -216,6 +216,9 @@ def simulate(name, precision):
         if isinstance(interaction, ps.SPH):
             with np.errstate(invalid="ignore"):  # densities were not computed
                 sim.interpolate(interaction, [(0, 0, 0)], "density")
+                for what in ("gradient", "laplacian"):
+                    given = {"normalized": True, "derivative": what}
+                    sim.interpolate(interaction, [(0, 0, 0)], "velocity", **given)
     for constraint in sim.constraints:
         with launch.record(Program()):
             constraint.reset([0])
