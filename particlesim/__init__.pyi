@@ -42,7 +42,12 @@ from .interactions.fluid.smoothing.smoothing_function import SmoothingFunction
 from .interactions.fluid.smoothing.splines import CubicSpline, QuinticSpline
 from .interactions.fluid.smoothing.wendland import WendlandC2, WendlandC4, WendlandC6
 from .interactions.fluid.sph import SPH
-from .interactions.fluid.viscosities import ArtificialViscosity, Viscosity
+from .interactions.fluid.viscosities import (
+    XSPH,
+    ArtificialViscosity,
+    LaminarViscosity,
+    Viscosity,
+)
 from .interactions.grains import HertzianGrains
 from .interactions.gravity.gravity import Gravity
 from .interactions.pair_laws import PairForce, PairPotential
@@ -70,6 +75,7 @@ from .simulation.simulation import Simulation
 
 __all__ = [
     "SPH",
+    "XSPH",
     "Angles",
     "ArtificialViscosity",
     "Bonds",
@@ -101,6 +107,7 @@ __all__ = [
     "Incident",
     "Integrator",
     "Interaction",
+    "LaminarViscosity",
     "Langevin",
     "Law",
     "Ledger",

@@ -73,16 +73,20 @@ def keep_state(
 
 
 def force_term(
-    slope: wp.Function, viscosity: wp.Function | None, dimension: int, precision: Precision,
-    data: Any, params: Any,
+    slope: wp.Function, laws: Mapping[str, wp.Function], switched: bool, dimension: int,
+    precision: Precision, data: Any, params: Any,
 ) -> Term:  # fmt: skip
     """Term f_ij / m_i = -m_j (P_i/rho_i^2 + P_j/rho_j^2 + Pi_ij) grad_i W_ij.
+
+    Where there is a law ``drag``, D_ij, with m_j D_ij W_ij' / r v_ij beside it.
+    ``switched``: Pi_ij is multiplied by the mean of the particles' switches.
 
     grad W vanishes with r, so coincident particles are taken as h apart along a fixed direction,
     in the order of their slots: they push each other apart, equally and opposite.
     """
     real, vec3, pair2 = precision.scalar, precision.vec3, precision.vector(2)
-    state_of, velocity_of = reader(precision, 4), reader(precision, 3)
+    state_of, velocity_of, read = reader(precision, 4), reader(precision, 3), reader(precision)
+    viscosity, drag = laws.get("term"), laws.get("drag")
     viscous = viscosity is not None
 
     def push(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
@@ -95,23 +99,45 @@ def force_term(
         if wp.static(viscous):
             v_ij = velocity_of(d.v, i) - velocity_of(d.v, j)
             mean = real(0.5) * (state_i + state_j)
-            stress += viscosity(wp.dot(v_ij, x_ij), distance2, mean[1], mean[3], p)
+            pi_ij = viscosity(wp.dot(v_ij, x_ij), distance2, mean[1], mean[3], p)
+            if wp.static(switched):
+                pi_ij *= real(0.5) * (read(d.balsara, i) + read(d.balsara, j))
+            stress += pi_ij
         # In this order no factor leaves the range of float32 before the others bring it back.
         gradient = (state_j[0] * p.sigma) * slope(wp.sqrt(distance2) * p.inverse_h)
         w = (-gradient * stress * p.inverse_h) * p.inverse_h
         return pair2(w, wp.where(apart, real(0.0), side * w))
 
-    return Term(function(push), 3, DIRECTIONS[dimension], "fused")
+    along = function(push)
+    if drag is None:
+        return Term(along, 3, DIRECTIONS[dimension], "fused")
+    aside = vec3(*DIRECTIONS[dimension])
+
+    def push_and_drag(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
+        t = along(i, j, x_ij, r2, d, p)
+        state_i = state_of(d.state, i)
+        state_j = state_of(d.state, j)
+        v_ij = velocity_of(d.v, i) - velocity_of(d.v, j)
+        D = drag(r2, state_i[1], state_j[1], real(0.5) * (state_i[3] + state_j[3]), p)
+        gradient = (state_j[0] * p.sigma) * slope(wp.sqrt(r2) * p.inverse_h)
+        w = (gradient * D * p.inverse_h) * p.inverse_h
+        return t[0] * x_ij + t[1] * aside + w * v_ij
+
+    return Term(function(push_and_drag), 3, None, "fused")
 
 
 def virial_term(force: Term, precision: Precision, data: Any, params: Any) -> Term:
     """Term x_ij . f_ij / 2, the particle's share of the virial."""
     real, vec3, one = precision.scalar, precision.vec3, precision.vector(1)
-    push = force.function
+    push, central = force.function, force.direction is not None
 
     def add_virial(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
         t = push(i, j, x_ij, r2, d, p)
-        return one(real(0.5) * d.m[i] * t[0] * wp.dot(x_ij, x_ij))
+        if wp.static(central):
+            w = t[0] * wp.dot(x_ij, x_ij)
+        else:
+            w = wp.dot(t, x_ij)
+        return one(real(0.5) * d.m[i] * w)
 
     return Term(function(add_virial), 1)
 

@@ -55,6 +55,7 @@ PARTS = {
     ps.Gravity: {"G": 1.0, "softening": 0.1},
     ps.HarmonicAngles: {"triples": [(0, 1, 2)], "stiffness": 1.0, "rest_angle": 2.0},
     ps.HarmonicBonds: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0},
+    ps.LaminarViscosity: {"kinematic_viscosity": 0.1},
     ps.LennardJones: {"epsilon": 1.0, "sigma": 1.0, "cutoff": 2.5},
     ps.GridField: {"lower": (0, 0, 0), "upper": (1, 1, 1), "spacing": 0.1, "speed": 1.0,
                    "density": 1.0, "damping": 0.1},
@@ -74,6 +75,7 @@ PARTS = {
     ps.Springs: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0, "damping": 0.1},
     ps.Tait: {"sound_speed": 10.0, "exponent": 7.0},
     ps.UniformGravity: {"acceleration": (0, -9.81, 0)},
+    ps.XSPH: {"epsilon": 0.5},
     ps.Yukawa: {"strength": 1.0, "screening": 1.0, "cutoff": 2.5},
 }  # fmt: skip
 OPEN = {(ps.BoxBoundary, "lower"), (ps.BoxBoundary, "upper")}  # a side may be infinitely far

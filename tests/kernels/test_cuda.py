@@ -62,6 +62,16 @@ def torsion(dihedral: float, multiplicity: int):
 
 
 @ps.law
+def bell(q: float):
+    s = wp.max(1.0 - 0.5 * q, 0.0)
+    return s * s * s * s * (1.0 + 2.0 * q)
+
+
+class Bell(ps.SmoothingFunction):
+    weight = bell
+
+
+@ps.law
 def flat(a: wp.vec3, b: wp.vec3, c: wp.vec3, area: float):
     return 0.5 * wp.length(wp.cross(b - a, c - a)) - area
 
@@ -167,9 +177,18 @@ SCENES = {
     "damped": (damped, VERLET),
     "periodic_forces": (lambda: few_forces(BOX, 600), VERLET | {"compensated": False}),
     "small_periodic_world": (lambda: few_forces(BOX, 20), {}),
-    "fluid": (lambda: fluid(None, viscosity=ps.ArtificialViscosity(0.1)), {}),
+    "fluid": (
+        lambda: fluid(
+            None, smoothing=Bell(),
+            viscosity=[
+                ps.ArtificialViscosity(0.1, balsara=True), ps.LaminarViscosity(0.1), ps.XSPH(),
+            ],
+        ),
+        {},
+    ),
     "periodic_fluid": (
-        lambda: fluid(BOX, smoothing="cubic_spline", equation_of_state=ps.Polytrope(1.0, 1.5)), {}
+        lambda: fluid(BOX, smoothing="cubic_spline", equation_of_state=ps.Polytrope(1.0, 1.5),
+                      viscosity=ps.ArtificialViscosity(0.1)), {}
     ),
     "constraints": (lambda: constrained(None, breaks=False, bounces=True), {"ledger": True}),
     "breaking": (lambda: constrained(BOX, breaks=True, bounces=False), {"compensated": False}),

@@ -55,9 +55,10 @@ def _damping_rates(
     part: Any, probe: Probe, each: dict[str, np.ndarray], c: np.ndarray
 ) -> np.ndarray:
     """gamma of every member."""
-    if part.viscosity is None:
+    forces = [each for each in part.viscosity if each.laws]
+    if not forces:
         return np.zeros_like(c)
-    if not isinstance(part.viscosity, ArtificialViscosity):
+    if not (len(forces) == 1 and isinstance(forces[0], ArtificialViscosity)):
         return np.full_like(c, probe.damping(part))
     speed = probe.relative_speed(part.pairs.members_host)
     meeting = speed.max() + np.sqrt((speed**2).mean())

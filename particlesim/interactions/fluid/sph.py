@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,8 @@ from .equations_of_state import EquationOfState
 from .limits import fluid_limits
 from .smoothing import SmoothingFunction, summable
 from .starts import complaint
-from .viscosities import Viscosity
+from .viscosities import Viscosity, several
+from .viscous_passes import Mixing, Switch
 
 # What laws may name beside smoothing_length, rest_density and the parameters of their part.
 VARIABLES = {
@@ -30,6 +32,7 @@ VARIABLES = {
     "energy": ("density",),
     "sound_speed": ("density", "pressure"),
     "term": ("approach", "distance_squared", "density", "sound_speed"),
+    "drag": ("distance_squared", "density_i", "density_j", "sound_speed"),
 }
 COINCIDENT = 1e-6  # closer than this, in parts of h, particles count as coincident
 
@@ -64,7 +67,8 @@ class SPH(Interaction):
             (does not clump at many neighbours), ``"wendland_c4"``, ``"wendland_c6"``,
             ``"cubic_spline"`` (sharper at few), ``"quintic_spline"``, ``"gaussian"``, ``"poly6"``,
             ``"spiky"``.
-        viscosity: :class:`ArtificialViscosity` or another ``Viscosity``; None: inviscid.
+        viscosity: :class:`ArtificialViscosity`, :class:`LaminarViscosity`, :class:`XSPH` or another
+            ``Viscosity``, or several of different kinds; None: inviscid.
         dimension: d of the normalisation of W: 3; 2 for scenes in a plane, whose density is a mass
             per area; 1 for scenes on a line. The plane is x-y and the line x where coincident
             particles are to stay in it.
@@ -90,7 +94,7 @@ class SPH(Interaction):
     def __init__(
         self, group: Any = None, *, smoothing_length: float, equation_of_state: EquationOfState,
         rest_density: float | None = None, smoothing: str | SmoothingFunction = "wendland_c2",
-        viscosity: Viscosity | None = None, dimension: int = 3,
+        viscosity: Viscosity | Sequence[Viscosity] | None = None, dimension: int = 3,
     ):  # fmt: skip
         self.group = group
         h = validate.number(
@@ -100,11 +104,8 @@ class SPH(Interaction):
             self.name, "equation_of_state", equation_of_state, EquationOfState,
             "Tait(sound_speed)",
         )  # fmt: skip
-        self.viscosity = viscosity
-        self.reads_velocity = viscosity is not None
-        self.conservative = viscosity is None
-        if viscosity is not None:
-            _of_kind(self.name, "viscosity", viscosity, Viscosity, "ArtificialViscosity(0.05)")
+        self.viscosity = several(self.name, viscosity)
+        self.reads_velocity, self.conservative = bool(self.viscosity), not self.viscosity
         if dimension not in (1, 2, 3):
             raise validate.fail(
                 self.name, "dimension", "be 1, 2 or 3", dimension, "choose one of these"
@@ -118,8 +119,8 @@ class SPH(Interaction):
             )
         self.sources: dict[str, dict[str, str]] = {}
         self._take("state", equation_of_state)
-        if viscosity is not None:
-            self._take("viscosity", viscosity)
+        for each in self.viscosity:
+            self._take("viscosity", each)
 
     def _take(self, prefix: str, part: EquationOfState | Viscosity) -> None:
         """Note what fills the arguments of a part's laws; its parameters join the fluid's."""
@@ -138,9 +139,17 @@ class SPH(Interaction):
             self.sources[name] = sources
 
     def kind(self) -> tuple[Any, ...]:
-        parts = [self.equation_of_state, *([self.viscosity] if self.viscosity else [])]
+        parts = [self.equation_of_state, *self.viscosity]
         laws = [law.func for part in parts for law in part.laws.values()]
-        return (type(self), *laws, self.smoothing.kind, self.dimension, tuple(self.parameters))
+        switched = tuple(each.switched for each in self.viscosity)
+        return (
+            type(self),
+            *laws,
+            switched,
+            self.smoothing.kind,
+            self.dimension,
+            tuple(self.parameters),
+        )
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
@@ -176,8 +185,12 @@ class SPH(Interaction):
         # Mass, density, P / rho^2 and sound speed of each slot, together as they are read together.
         self.slot_state = self.pairs.array(precision.vector(4))
         fields = {"x": own["position"], "m": own["mass"], "state": self.slot_state}
-        if self.viscosity is not None:
+        if self.viscosity:
             fields["v"] = own["velocity"]
+        self.switch = Switch(self) if any(each.switched for each in self.viscosity) else None
+        if self.switch:
+            fields["balsara"] = self.switch.values
+        self.mixing = Mixing(self, state) if any(each.mixes for each in self.viscosity) else None
         self.loop = PairLoop.over(model, self.pairs, "Fluid", fields, self.Params, self.params)
         self.state = state
         self.laws = self._laws()
@@ -185,12 +198,14 @@ class SPH(Interaction):
         types = precision, self.loop.Data, self.Params
         self.density_term = kernels.density_term(self.weight, *types)
         slope = self.smoothing.slope.function(precision)
-        self.force_term = kernels.force_term(slope, self.laws.get("term"), self.dimension, *types)
+        self.force_term = kernels.force_term(
+            slope, self.laws, self.switch is not None, self.dimension, *types
+        )
 
     def _laws(self) -> dict[str, wp.Function]:
         """The parts' laws as functions of their variables and the fluid's parameters."""
         precision = self.model.precision
-        parts = [self.equation_of_state, *([self.viscosity] if self.viscosity else [])]
+        parts = [self.equation_of_state, *self.viscosity]
         return {
             name: kernels.bound_law(
                 name, law.function(precision, part.name, float), VARIABLES[name],
@@ -203,14 +218,22 @@ class SPH(Interaction):
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         self._sum_density(state)
         self.loop.sum(self.force_term, kernels.add_force, {"f": state.force})
+        if self.mixing:
+            self.mixing.sum()
+
+    def advance(self, state: State, dt: float) -> None:
+        if self.mixing:
+            self.mixing.move(dt)
 
     def _sum_density(self, state: State, sounds: bool = False) -> None:
         """Density, pressure and their slots; speeds of sound for a viscosity, or if asked for."""
-        sounds = sounds or self.viscosity is not None
+        sounds = sounds or bool(self.viscosity)
         laws = self.laws["pressure"], self.laws["sound_speed"] if sounds else None
         store = functools.partial(kernels.keep_state, self.weight, *laws)
         out = {"state": self.slot_state, "rho": state.density, "pressure": state.pressure}
         self.loop.sum(self.density_term, store, out)
+        if self.switch:
+            self.switch.sum()
 
     def limits(self, probe: Probe) -> list[Limit]:
         """By sound with viscosity, and by acceleration."""
@@ -223,7 +246,7 @@ class SPH(Interaction):
     def sound_speeds(self, probe: Probe) -> np.ndarray:
         """Speed of sound at the present densities, of each member [length/time]."""
         probe.force([self])
-        if self.viscosity is None:  # whose passes have no need of it
+        if not self.viscosity:  # whose passes have no need of it
             self._sum_density(probe.state, sounds=True)
         c = np.empty(self.pairs.count)
         members = self.pairs.members_host
