@@ -46,6 +46,7 @@ from .interactions.fluid.viscosities import (
     XSPH,
     ArtificialViscosity,
     LaminarViscosity,
+    ParticleShifting,
     Viscosity,
 )
 from .interactions.grains import HertzianGrains
@@ -120,6 +121,7 @@ __all__ = [
     "PairPotential",
     "PairSum",
     "ParticleForce",
+    "ParticleShifting",
     "PlaneBoundary",
     "PoissonField",
     "Poly6",

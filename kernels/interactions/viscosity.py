@@ -1,4 +1,4 @@
-"""Passes over a fluid beside density and force: how it turns, and how velocities are mixed."""
+"""Passes over a fluid beside density and force: how it turns, and how else its particles move."""
 
 import functools
 from typing import Any
@@ -8,6 +8,7 @@ import warp as wp
 from ..engine.loops import Term, reader
 from ..precision import Precision, function
 
+SHIFT = 8.0  # of U h, by which a shift follows the gradient of the concentration
 LEAST = 1e-4  # of c / h, what a switch takes for no motion (Balsara 1995)
 
 
@@ -41,7 +42,9 @@ def keep_switch(precision: Precision, data: Any, params: Any, out: Any) -> wp.Fu
     return function(keep)
 
 
-def mixing_term(weight: wp.Function, precision: Precision, data: Any, params: Any) -> Term:
+def mixing_term(
+    weight: wp.Function, slope: wp.Function, precision: Precision, data: Any, params: Any
+) -> Term:  # fmt: skip
     """Term m_j (v_j - v_i) W / rho, rho the mean of the pair, without what W is normalised by."""
     real, vec3 = precision.scalar, precision.vec3
     state_of, velocity_of = reader(precision, 4), reader(precision, 3)
@@ -63,5 +66,32 @@ def keep_mixing(precision: Precision, data: Any, params: Any, out: Any) -> wp.Fu
     def keep(i: int, particle: int, total: vec3, d: data, p: params, o: out):
         moves = wp.where(o.w[particle] > real(0.0), p.viscosity_epsilon * p.sigma, real(0.0))
         o.drift[particle] = moves * total
+
+    return function(keep)
+
+
+def shifting_term(
+    weight: wp.Function, slope: wp.Function, precision: Precision, data: Any, params: Any
+) -> Term:  # fmt: skip
+    """Term m_j grad W / rho, rho the mean of the pair, without what W is normalised by, and h^2."""
+    real, vec3 = precision.scalar, precision.vec3
+    state_of = reader(precision, 4)
+
+    def add_shifting(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
+        state_j = state_of(d.state, j)
+        rho = real(0.5) * (state_of(d.state, i)[1] + state_j[1])
+        return (state_j[0] / rho * slope(wp.sqrt(r2) * p.inverse_h)) * x_ij
+
+    return Term(function(add_shifting), 3)
+
+
+@functools.cache
+def keep_shifting(precision: Precision, data: Any, params: Any, out: Any) -> wp.Function:
+    """Store: -8 U h times the sum, of particles that may move."""
+    real, vec3 = precision.scalar, precision.vec3
+
+    def keep(i: int, particle: int, total: vec3, d: data, p: params, o: out):
+        shift = real(SHIFT) * p.viscosity_speed * (p.sigma * p.inverse_h)
+        o.drift[particle] = wp.where(o.w[particle] > real(0.0), -shift, real(0.0)) * total
 
     return function(keep)

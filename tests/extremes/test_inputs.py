@@ -63,6 +63,7 @@ PARTS = {
     ps.Morse: {"depth": 1.0, "steepness": 1.0, "distance": 1.0, "cutoff": 2.5},
     ps.PairForce: {"law": pull, "cutoff": 1.0, "strength": 1.0},
     ps.PairPotential: {"law": pull, "cutoff": 1.0, "strength": 1.0},
+    ps.ParticleShifting: {"speed": 1.0},
     ps.PlaneBoundary: {"point": (0, 0, 0), "normal": (0, 1, 0), "friction": 0.1},
     ps.PoissonField: {"lower": (0, 0, 0), "upper": (1, 1, 1), "spacing": 0.1},
     ps.Polytrope: {"constant": 1.0, "index": 1.0},

@@ -188,7 +188,7 @@ SCENES = {
     ),
     "periodic_fluid": (
         lambda: fluid(BOX, smoothing="cubic_spline", equation_of_state=ps.Polytrope(1.0, 1.5),
-                      viscosity=ps.ArtificialViscosity(0.1)), {}
+                      viscosity=[ps.ArtificialViscosity(0.1), ps.ParticleShifting(1.0)]), {}
     ),
     "constraints": (lambda: constrained(None, breaks=False, bounces=True), {"ledger": True}),
     "breaking": (lambda: constrained(BOX, breaks=True, bounces=False), {"compensated": False}),

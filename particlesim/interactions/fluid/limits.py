@@ -9,8 +9,9 @@ import numpy as np
 
 from ...engine.limit import Limit
 from ...engine.probe import Probe
+from ...kernels.interactions.viscosity import SHIFT
 from .smoothing.smoothing_function import Smoothing
-from .viscosities import ArtificialViscosity
+from .viscosities import ArtificialViscosity, ParticleShifting
 
 ACCELERATION = 0.25
 ADVISED = 0.4  # of h / c, for accuracy (Monaghan 1992)
@@ -27,6 +28,7 @@ def fluid_limits(part: Any, probe: Probe) -> list[Limit]:
       (:func:`damping`), mu being the speed at which the fastest meets a typical particle; that of
       another viscosity is asked of its force.
     - acceleration: 0.25 sqrt(h / |a|) (Monaghan 1992).
+    - shifting: 2 over the rate at which :class:`ParticleShifting` evens out the concentration.
     """
     rows = part.pairs.members_host
     if not len(rows):
@@ -48,7 +50,24 @@ def fluid_limits(part: Any, probe: Probe) -> list[Limit]:
         reason = f"0.25 sqrt(h / a), h = {h[k]:.4g}, a = {a[k]:.4g}"
         dt = ACCELERATION * float(np.sqrt(h[k] / a[k]))
         limits.append(Limit(part.name, "acceleration", dt, reason, *probe.place(int(rows[k]))))
-    return limits
+    return limits + _shifting_limit(part, probe, each)
+
+
+def _shifting_limit(part: Any, probe: Probe, each: dict[str, np.ndarray]) -> list[Limit]:
+    """Of x' = -lambda x, lambda = 8 U / h kappa^2 W_hat (1 - W_hat / 2) of a wave: 2 / lambda.
+
+    Volumes follow the density, whose wave is W_hat of that of the places; half of it is a mean's.
+    """
+    if not any(isinstance(viscosity, ParticleShifting) for viscosity in part.viscosity):
+        return []
+    speed, h = each["viscosity_speed"], each["smoothing_length"]
+    k = int(np.argmax(speed / h))
+    w = transform(part.smoothing, part.dimension)
+    rate = SHIFT * float(speed[k] / h[k] * np.abs(WAVENUMBERS**2 * w * (1.0 - 0.5 * w)).max())
+    if rate == 0.0:
+        return []
+    row = int(part.pairs.members_host[k])
+    return [Limit(part.name, "shifting", 2.0 / rate, f"rate {rate:.4g} /s", *probe.place(row))]
 
 
 def _damping_rates(
@@ -66,12 +85,14 @@ def _damping_rates(
     return damping(part.smoothing, part.dimension) * strength / each["smoothing_length"]
 
 
-@functools.cache
 def steepest(smoothing: Smoothing, dimension: int) -> float:
-    """max of kappa W_hat(kappa), kappa = k h: the largest omega is that times c / h.
+    """max of kappa W_hat(kappa), kappa = k h: the largest omega is that times c / h."""
+    return float(np.abs(WAVENUMBERS * transform(smoothing, dimension)).max())
 
-    W_hat(k) = int W cos(k.x) d^dx, 1 at k = 0.
-    """
+
+@functools.cache
+def transform(smoothing: Smoothing, dimension: int) -> np.ndarray:
+    """W_hat(k) = int W cos(k.x) d^dx, 1 at k = 0, at ``WAVENUMBERS`` / h."""
     q, w = _samples(smoothing)
     angles = WAVENUMBERS[:, None] * q
     if dimension == 1:
@@ -81,8 +102,7 @@ def steepest(smoothing: Smoothing, dimension: int) -> float:
         shell = 2.0 * np.pi * q * np.cos(angles[..., None] * np.cos(turn)).mean(axis=-1)
     else:
         shell = 4.0 * np.pi * q**2 * np.sinc(angles / np.pi)
-    transform = (shell * w).sum(axis=1) * smoothing.support / POINTS
-    return float(np.abs(WAVENUMBERS * transform).max())
+    return (shell * w).sum(axis=1) * smoothing.support / POINTS
 
 
 @functools.cache

@@ -24,7 +24,7 @@ from .limits import fluid_limits
 from .smoothing import SmoothingFunction, summable
 from .starts import complaint
 from .viscosities import Viscosity, several
-from .viscous_passes import Mixing, Switch
+from .viscous_passes import Drift, Switch
 
 # What laws may name beside smoothing_length, rest_density and the parameters of their part.
 VARIABLES = {
@@ -68,7 +68,8 @@ class SPH(Interaction):
             ``"cubic_spline"`` (sharper at few), ``"quintic_spline"``, ``"gaussian"``, ``"poly6"``,
             ``"spiky"``.
         viscosity: :class:`ArtificialViscosity`, :class:`LaminarViscosity`, :class:`XSPH` or another
-            ``Viscosity``, or several of different kinds; None: inviscid.
+            ``Viscosity``, or several of different kinds, with :class:`ParticleShifting`; None:
+            inviscid.
         dimension: d of the normalisation of W: 3; 2 for scenes in a plane, whose density is a mass
             per area; 1 for scenes on a line. The plane is x-y and the line x where coincident
             particles are to stay in it.
@@ -190,7 +191,8 @@ class SPH(Interaction):
         self.switch = Switch(self) if any(each.switched for each in self.viscosity) else None
         if self.switch:
             fields["balsara"] = self.switch.values
-        self.mixing = Mixing(self, state) if any(each.mixes for each in self.viscosity) else None
+        drifts = (Drift(self, state, each) for each in self.viscosity if each.drifts)
+        self.drift = next(drifts, None)
         self.loop = PairLoop.over(model, self.pairs, "Fluid", fields, self.Params, self.params)
         self.state = state
         self.laws = self._laws()
@@ -218,12 +220,12 @@ class SPH(Interaction):
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         self._sum_density(state)
         self.loop.sum(self.force_term, kernels.add_force, {"f": state.force})
-        if self.mixing:
-            self.mixing.sum()
+        if self.drift:
+            self.drift.sum()
 
     def advance(self, state: State, dt: float) -> None:
-        if self.mixing:
-            self.mixing.move(dt)
+        if self.drift:
+            self.drift.move(dt)
 
     def _sum_density(self, state: State, sounds: bool = False) -> None:
         """Density, pressure and their slots; speeds of sound for a viscosity, or if asked for."""

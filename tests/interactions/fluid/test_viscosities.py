@@ -18,9 +18,10 @@ PRECISIONS = ["float64", pytest.param("float32", marks=pytest.mark.slow)]
 ALL = (ps.ArtificialViscosity(0.5, 1.0, balsara=True), ps.LaminarViscosity(0.3), ps.XSPH(0.4))
 
 
-def pairs(x):
+def pairs(x, side=np.inf):
     """Separations, distances, and W and W' / r of all pairs."""
     d = x[:, None] - x[None]
+    d = d - np.where(np.isinf(side), 0.0, side) * np.round(d / side)
     r = np.linalg.norm(d, axis=2)
     s = np.maximum(1 - r / H / 2, 0)
     return d, r, SIGMA * s**4 * (1 + 2 * r / H), SIGMA / H**2 * -5 * s**3
@@ -65,7 +66,7 @@ def test_sums_equal_brute_force(precision, cloud, fluid, prepared):
     eps = np.finfo(precision).eps
     # As of test_sums.py; the switch divides two sums, each of which cancels to a tenth or so.
     assert np.abs(sim.get("force") - force).max() < 2000 * eps * np.abs(force).max()
-    found = sim.interactions[0].mixing.drift.numpy()
+    found = sim.interactions[0].drift.drift.numpy()
     assert np.abs(found - drift).max() < 200 * eps * np.abs(drift).max()
     # Moving so changes no angular momentum: m v x drift is odd in every pair.
     turned = (m[:, None] * np.cross(found, v)).sum(axis=0)
@@ -206,3 +207,47 @@ def test_bad_parameters(refused):
         ps.XSPH(1.5)
     with refused("XSPH: epsilon must be at least 0"):
         ps.XSPH(-0.5)
+
+
+@pytest.mark.slow
+def test_shifting_equals_brute_force(precision, fluid, prepared):
+    """On a lattice out of order; the centre of mass stays where it is."""
+    x = ps.sample.box((0, 0, 0), SIDE, 0.5)
+    x = x + np.random.default_rng(0).uniform(-0.1, 0.1, x.shape)
+    m = np.random.default_rng(1).uniform(0.1, 0.15, len(x))
+    box = ((0, 0, 0), SIDE)
+    sim = prepared(fluid(x, m=m, periodic=box, viscosity=ps.ParticleShifting(0.3)), precision)
+    d, _, weight, slope = pairs(x, SIDE)
+    volume = m / mean((m * weight).sum(axis=1))
+    shift = -8 * 0.3 * H * ((volume * slope)[..., None] * d).sum(axis=1)
+    drift = sim.interactions[0].drift.drift.numpy()
+    # Sums of fifty terms that cancel to a tenth.
+    eps = np.finfo(precision).eps
+    assert np.abs(drift - shift).max() < 500 * eps * np.abs(shift).max()
+    assert np.all(np.abs(m @ drift) < 500 * eps * (m @ np.abs(shift)))  # odd in every pair
+
+
+def test_shifting_wants_a_full_box(fluid, refused):
+    scene = fluid(np.zeros((1, 3)), periodic=((0, 0, None), (4, 4, None)),
+                  viscosity=ps.ParticleShifting(1.0))  # fmt: skip
+    with refused("ParticleShifting: scene must be periodic along every axis of the fluid"):
+        ps.Simulation(scene, device="cpu")
+
+
+@pytest.mark.slow
+def test_shifting_bounds_the_step(fluid):
+    x = ps.sample.box((0, 0, 0), SIDE, 0.5)
+    scene = fluid(x, m=0.125, periodic=((0, 0, 0), SIDE), viscosity=ps.ParticleShifting(50.0))
+    sim = ps.Simulation(scene, ps.Settings(precision="float64"), device="cpu")
+    bound = sim.stability().binding
+    assert bound.kind == "shifting"
+    spread = []
+    for factor in (0.9, 1.2):
+        scene = fluid(x + np.random.default_rng(0).uniform(-1e-4, 1e-4, x.shape), m=0.125,
+                      periodic=((0, 0, 0), SIDE), viscosity=ps.ParticleShifting(50.0))  # fmt: skip
+        settings = ps.Settings(dt=40 * factor * bound.dt, substeps=40, precision="float64")
+        sim = ps.Simulation(scene, settings, device="cpu")
+        sim.step()
+        moved = (sim.position - x + SIDE / 2) % SIDE - SIDE / 2
+        spread.append((moved - moved.mean(axis=0)).std())
+    assert spread[0] < 2e-4 and spread[1] > 1e-2
