@@ -139,7 +139,15 @@ for precision, periodic in (("float32", None), ("float64", ((0, 0, 0), (4, 4, 4)
         scene.add_interaction(
             ps.SPH(smoothing_length=0.5, rest_density=1.0, equation_of_state=ps.Tait(1.0),
                    smoothing=name, viscosity=ps.ArtificialViscosity(0.1)))
-    ps.Simulation(scene, ps.Settings(precision=precision), device="cpu").diagnostics()
+    for drift in (ps.XSPH(), ps.ParticleShifting(1.0)):
+        if periodic or isinstance(drift, ps.XSPH):
+            scene.add_interaction(
+                ps.SPH(smoothing_length=0.5, rest_density=1.0, equation_of_state=ps.Tait(1.0),
+                       viscosity=[ps.ArtificialViscosity(0.1, balsara=True),
+                                  ps.LaminarViscosity(0.1), drift]))
+    sim = ps.Simulation(scene, ps.Settings(precision=precision), device="cpu")
+    sim.forces(0.0)
+    sim.diagnostics()
 """
 
 
