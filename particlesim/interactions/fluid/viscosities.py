@@ -78,8 +78,8 @@ class ArtificialViscosity(Viscosity):
     energy into heat that nobody keeps. In shear it is a kinematic viscosity of nearly
     alpha c h / (4 (d + 2)) in d dimensions: half of what it would be if receding pairs felt it too,
     alpha c h / 10 in three dimensions (Lodato and Price 2010). That is an integral; the sums of
-    Wendland's C2 make 0.94 to 0.97 of it at h = 2 spacings, 0.9 to 0.97 at 1.6, and 0.84 to 0.88 at
-    1.3, where a lattice does not last in shear and what becomes of it has no one viscosity.
+    Wendland's C2 make 0.95 to 0.97 of it at h = 2 spacings, 0.90 to 0.98 at 1.6, and at 1.3 0.84 to
+    0.88 as long as a lattice lasts in shear, which is not long; its ruins have no one viscosity.
 
     Args:
         alpha: Strength of the part linear in the speed, at least 0.

@@ -230,3 +230,18 @@ def test_what_no_fluid_can_be_made_of(refused):
         ps.Spiky().value(0.5, h=0.0)
     with pytest.raises(TypeError, match="SmoothingFunction: laws must have a weight, got none"):
         ps.SmoothingFunction().value(0.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name, ratio, error",
+    [
+        ("cubic_spline", 1.2, 0.0008), ("cubic_spline", 1.3, -0.0027), ("quintic_spline", 1.0, 0),
+        ("wendland_c2", 1.3, 0.0095), ("wendland_c2", 1.6, 0.0027), ("wendland_c2", 2.0, 0.0005),
+        ("gaussian", 1.0, 0.0002), ("spiky", 1.3, 0.0808), ("spiky", 2.0, 0.0148),
+    ],
+)  # fmt: skip
+def test_density_of_a_cubic_lattice_is_as_told(name, ratio, error):
+    cells = np.arange(-6, 7)
+    r = np.linalg.norm(np.stack(np.meshgrid(cells, cells, cells), axis=-1), axis=-1)
+    assert SMOOTHING[name].value(r, ratio).sum() - 1 == pytest.approx(error, abs=6e-5)

@@ -73,9 +73,9 @@ def spiky_curvature(q: float):
 class Spiky(SmoothingFunction):
     """w = (1 - u)^3, u = r / 2h, with support 2 h (Mueller 2003, eq. 21).
 
-    A cusp at the centre: its gradient keeps its size there, so that particles never come together
-    in clumps, and changes its direction at once, so that a fluid is noisier and sound in it stiffer
-    than with Wendland's functions. In more than one dimension its laplacian is infinite at r = 0.
+    A cusp at the centre: its gradient keeps its size there, so that particles do not come together
+    in clumps, and turns at once. The density of a cubic lattice is 8 % too high at an h of 1.3
+    spacings, 1.5 % at 2. In more than one dimension its laplacian is infinite at r = 0.
 
     Example:
         >>> round(Spiky().in_dimension(3).sigma, 4)

@@ -67,7 +67,8 @@ class WendlandC2(_Wendland):
     """Wendland's C2, w = (1 - u)^4 (1 + 4u), u = r / 2h, with support 2 h.
 
     On a line w = (1 - u)^3 (1 + 3u). (Wendland 1995; Dehnen and Aly 2012.) For any number of
-    neighbours; at few it is less exact than a spline.
+    neighbours; at few it is less exact than a spline: the density of a cubic lattice is 0.95 % too
+    high at an h of 1.3 spacings, 0.27 % at 1.6 and 0.05 % at 2.
 
     Example:
         >>> round(WendlandC2().in_dimension(2).sigma, 4)
