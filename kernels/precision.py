@@ -207,9 +207,11 @@ def function(func: Callable[..., Any], after_gradients: bool = False) -> wp.Func
     """Register ``func``, annotated with Warp types, under a native name that repeats in every run.
 
     The name hashes the source and the closure, by the native names of the functions in it.
-    ``after_gradients`` is for functions that call what uses ``wp.grad``, see ``named_function``.
+    ``after_gradients`` is for functions that call what uses ``wp.grad``, see ``named_function``;
+    those that call one of these are too.
     """
     cells = [c.cell_contents for c in func.__closure__ or ()]
+    after_gradients = after_gradients or any(map(is_after_gradients, cells))
     content = digest(inspect.getsource(func), *cells, *func.__annotations__.values())
     name = f"{func.__name__}_{content}"
     return named_function(func, name, after_gradients=after_gradients)
@@ -236,6 +238,7 @@ def function_from_source(
     """Make a Warp function of generated source; ``namespace`` holds the names it refers to."""
     name = re.search(r"def (\w+)\(", source).group(1)
     content = digest(source, *namespace.keys(), *namespace.values())
+    after_gradients = after_gradients or any(map(is_after_gradients, namespace.values()))
     func = compiled(source, name, {**namespace, "__name__": __name__})
     return named_function(func, f"{name}_{content}", after_gradients=after_gradients)
 

@@ -43,8 +43,19 @@ from .interactions.fluid.equations_of_state import (
     Tait,
 )
 from .interactions.fluid.lengths import AdaptiveSmoothing
+from .interactions.fluid.smoothing.gaussian import Gaussian
+from .interactions.fluid.smoothing.mueller import MuellerViscosity, Poly6, Spiky
+from .interactions.fluid.smoothing.smoothing_function import SmoothingFunction
+from .interactions.fluid.smoothing.splines import CubicSpline, QuinticSpline
+from .interactions.fluid.smoothing.wendland import WendlandC2, WendlandC4, WendlandC6
 from .interactions.fluid.sph import SPH
-from .interactions.fluid.viscosities import ArtificialViscosity, Viscosity
+from .interactions.fluid.viscosities import (
+    XSPH,
+    ArtificialViscosity,
+    LaminarViscosity,
+    ParticleShifting,
+    Viscosity,
+)
 from .interactions.grains import HertzianGrains
 from .interactions.gravity.gravity import Gravity
 from .interactions.pair_laws import PairForce, PairPotential
@@ -75,6 +86,7 @@ from .simulation.simulation import Simulation
 
 __all__ = [
     "SPH",
+    "XSPH",
     "AdaptiveSmoothing",
     "Angles",
     "ArtificialViscosity",
@@ -90,6 +102,7 @@ __all__ = [
     "ConstraintForce",
     "Contact",
     "Coulomb",
+    "CubicSpline",
     "Dihedrals",
     "Distance",
     "Drag",
@@ -97,6 +110,7 @@ __all__ = [
     "EquationOfState",
     "FENEBonds",
     "FieldForce",
+    "Gaussian",
     "Gravity",
     "GridField",
     "Group",
@@ -109,6 +123,7 @@ __all__ = [
     "Integrator",
     "Interaction",
     "Isothermal",
+    "LaminarViscosity",
     "Langevin",
     "Law",
     "Ledger",
@@ -116,22 +131,28 @@ __all__ = [
     "Measured",
     "Mie",
     "Morse",
+    "MuellerViscosity",
     "PairForce",
     "PairPotential",
     "PairSum",
     "ParticleForce",
+    "ParticleShifting",
     "PlaneBoundary",
     "PoissonField",
+    "Poly6",
     "Polytrope",
     "Profile",
+    "QuinticSpline",
     "RadialDistribution",
     "Scene",
     "Settings",
     "Simulation",
     "SimulationError",
     "SimulationWarning",
+    "SmoothingFunction",
     "SoftSphere",
     "SphereBoundary",
+    "Spiky",
     "Springs",
     "Stability",
     "StabilityWarning",
@@ -146,6 +167,9 @@ __all__ = [
     "UsdRecorder",
     "VelocityRescaling",
     "Viscosity",
+    "WendlandC2",
+    "WendlandC4",
+    "WendlandC6",
     "Yukawa",
     "__version__",
     "launch",

@@ -133,12 +133,19 @@ KIN = {
 BOUND = ("FieldForce",)  # to a grid, which rests in the frame that it is made in
 
 
+NU = Quantity(0.1, (2, 0, -1))
+
+
 def fluid_parts(frame):
     """The parts of a fluid, which are objects of their own."""
     speed = frame.of(Quantity(3.0, (1, 0, -1)))
     return {
         "equation_of_state": ps.Tait(sound_speed=speed),
-        "viscosity": ps.ArtificialViscosity(0.2),
+        "viscosity": [
+            ps.ArtificialViscosity(0.2, balsara=True),
+            ps.LaminarViscosity(frame.of(NU)),
+            ps.XSPH(),
+        ],
     }
 
 
@@ -186,6 +193,14 @@ def quantity(name, key):
 def make(name, frame):
     """A part by its name."""
     return kinds()[name](**arguments(name, frame))
+
+
+def along_pairs(name, frame):
+    """A part by its name; of viscosities that which acts along pairs alone."""
+    given = arguments(name, frame)
+    if "viscosity" in given:
+        given["viscosity"] = given["viscosity"][0]
+    return kinds()[name](**given)
 
 
 def along_axes(name):

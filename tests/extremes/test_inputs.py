@@ -62,6 +62,7 @@ PARTS = {
     ps.HarmonicBonds: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0},
     ps.IdealGas: {"gamma": 1.4},
     ps.Isothermal: {"sound_speed": 1.0},
+    ps.LaminarViscosity: {"kinematic_viscosity": 0.1},
     ps.LennardJones: {"epsilon": 1.0, "sigma": 1.0, "cutoff": 2.5},
     ps.GridField: {"lower": (0, 0, 0), "upper": (1, 1, 1), "spacing": 0.1, "speed": 1.0,
                    "density": 1.0, "damping": 0.1},
@@ -69,6 +70,7 @@ PARTS = {
     ps.Morse: {"depth": 1.0, "steepness": 1.0, "distance": 1.0, "cutoff": 2.5},
     ps.PairForce: {"law": pull, "cutoff": 1.0, "strength": 1.0},
     ps.PairPotential: {"law": pull, "cutoff": 1.0, "strength": 1.0},
+    ps.ParticleShifting: {"speed": 1.0},
     ps.PlaneBoundary: {"point": (0, 0, 0), "normal": (0, 1, 0), "friction": 0.1},
     ps.PoissonField: {"lower": (0, 0, 0), "upper": (1, 1, 1), "spacing": 0.1},
     ps.Polytrope: {"constant": 1.0, "index": 1.0},
@@ -81,6 +83,7 @@ PARTS = {
     ps.Springs: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0, "damping": 0.1},
     ps.Tait: {"sound_speed": 10.0, "exponent": 7.0},
     ps.UniformGravity: {"acceleration": (0, -9.81, 0)},
+    ps.XSPH: {"epsilon": 0.5},
     ps.Yukawa: {"strength": 1.0, "screening": 1.0, "cutoff": 2.5},
 }  # fmt: skip
 OPEN = {(ps.BoxBoundary, "lower"), (ps.BoxBoundary, "upper")}  # a side may be infinitely far

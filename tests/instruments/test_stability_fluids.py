@@ -31,9 +31,20 @@ def fluid(
     return scene
 
 
-@pytest.mark.parametrize("smoothing", list(SMOOTHING))
+OFTEN = ("cubic_spline", "wendland_c2")
+
+
+@pytest.mark.parametrize(
+    "smoothing",
+    [
+        *OFTEN,
+        *(pytest.param(each, marks=pytest.mark.slow) for each in sorted({*SMOOTHING} - {*OFTEN})),
+    ],
+)
 def test_sound_limit_is_that_of_the_fluid_itself(smoothing):
-    sim = simulation(fluid(smoothing=smoothing), precision="float64")
+    # What is narrow has as many neighbours that count at a larger h.
+    ratio = 1.6 if smoothing in ("wendland_c6", "spiky") else 1.3
+    sim = simulation(fluid(ratio=ratio, smoothing=smoothing), precision="float64")
     sph = sim.interactions[0]
     sound = sim.stability().binding
     assert sound.kind == "sound"
@@ -43,7 +54,7 @@ def test_sound_limit_is_that_of_the_fluid_itself(smoothing):
     # The continuum's wave of largest omega against the lattice's: 74 neighbours, within 5 %.
     assert sound.dt == pytest.approx(true.dt, rel=0.05)
     assert sound.dt == pytest.approx(
-        2 * 0.13 / (c.max() * steepest(SMOOTHING[smoothing][3], 3)), rel=1e-6
+        2 * 0.1 * ratio / (c.max() * steepest(SMOOTHING[smoothing].in_dimension(3), 3)), rel=1e-6
     )
 
 
@@ -72,7 +83,7 @@ def in_space():
 @pytest.mark.parametrize(("dimension", "expected"), [(1, schoenberg), (3, in_space)])
 def test_steepest_of_the_cubic_spline(dimension, expected):
     # On a line the transform is (sin(k/2) / (k/2))^4 (Schoenberg 1946).
-    smoothing = SMOOTHING["cubic_spline"][dimension]
+    smoothing = SMOOTHING["cubic_spline"].in_dimension(dimension)
     assert steepest(smoothing, dimension) == pytest.approx(expected(), rel=1e-3)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from cases.parts import COUNT, KIN, PLAIN, TUPLES, kinds, particles, scene
+from cases.parts import COUNT, KIN, PLAIN, TUPLES, along_pairs, kinds, particles, scene
 from particlesim.scene.part import Interaction
 
 EPS = float(np.finfo(np.float64).eps)
@@ -66,12 +66,18 @@ def test_momentum_and_angular_momentum(name):
     """What acts between particles changes neither, to round-off of a sum of COUNT terms."""
     if name in EXTERNAL:
         pytest.skip("it takes up momentum")
-    described = scene([name])
+    described = scene([name], changed=along_pairs)
     before = ps.Simulation(described, SETTINGS, device="cpu").diagnostics()
     after = run(described).diagnostics()
     assert np.abs(after.momentum - before.momentum).max() < ROUNDING
     if name in FORCES and name != "HertzianGrains":  # which rub, and do not turn
         assert np.abs(after.angular_momentum - before.angular_momentum).max() < ROUNDING
+
+
+def test_momentum_of_a_fluid_of_all_viscosities():
+    described = scene(["SPH"])
+    before = ps.Simulation(described, SETTINGS, device="cpu").diagnostics()
+    assert np.abs(run(described).diagnostics().momentum - before.momentum).max() < ROUNDING
 
 
 @pytest.mark.parametrize("name", FORCES)

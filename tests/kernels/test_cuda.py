@@ -62,6 +62,16 @@ def torsion(dihedral: float, multiplicity: int):
 
 
 @ps.law
+def bell(q: float):
+    s = wp.max(1.0 - 0.5 * q, 0.0)
+    return s * s * s * s * (1.0 + 2.0 * q)
+
+
+class Bell(ps.SmoothingFunction):
+    weight = bell
+
+
+@ps.law
 def flat(a: wp.vec3, b: wp.vec3, c: wp.vec3, area: float):
     return 0.5 * wp.length(wp.cross(b - a, c - a)) - area
 
@@ -167,7 +177,7 @@ def attracted(s, **attributes):
     return scene
 
 
-BOX = ((0, 0, 0), (10, 10, 10))
+BOX, XSPH = ((0, 0, 0), (10, 10, 10)), ps.XSPH()
 VERLET = {"integrator": "velocity_verlet"}
 SCENES = {
     "gas": (lambda: particles(), {}),
@@ -177,9 +187,16 @@ SCENES = {
     "damped": (damped, VERLET),
     "periodic_forces": (lambda: few_forces(BOX, 600, True), VERLET | {"compensated": False}),
     "small_periodic_world": (lambda: few_forces(BOX, 20), {}),
-    "fluid": (lambda: fluid(None, viscosity=ps.ArtificialViscosity(0.1)), {}),
+    "fluid": (
+        lambda: fluid(
+            None, smoothing=Bell(),
+            viscosity=[ps.ArtificialViscosity(0.1, balsara=True), ps.LaminarViscosity(0.1), XSPH],
+        ),
+        {},
+    ),
     "periodic_fluid": (
-        lambda: fluid(BOX, smoothing="cubic_spline", equation_of_state=ps.Polytrope(1.0, 1.5)), {}
+        lambda: fluid(BOX, smoothing="cubic_spline", equation_of_state=ps.Polytrope(1.0, 1.5),
+                      viscosity=[ps.ArtificialViscosity(0.1), ps.ParticleShifting(1.0)]), {}
     ),
     "heated_fluid": (heated, {}),
     "gas_dynamics": (lambda: heated(smoothing_length=ps.AdaptiveSmoothing()), VERLET),
@@ -228,6 +245,9 @@ def simulate(name, precision):
         if isinstance(interaction, ps.SPH):
             with np.errstate(invalid="ignore"):  # densities were not computed
                 sim.interpolate(interaction, [(0, 0, 0)], "density")
+                for what in ("gradient", "laplacian"):
+                    given = {"normalized": True, "derivative": what}
+                    sim.interpolate(interaction, [(0, 0, 0)], "velocity", **given)
     for constraint in sim.constraints:
         with launch.record(Program()):
             constraint.reset([0])

@@ -182,7 +182,7 @@ def test_sound_wave(name, ratio):
     spacing = 1 / count
     h = ratio * spacing
     away = spacing * np.arange(1, 5)
-    q, sigma, e = away / h, SMOOTHING[name][1].sigma / h, 1e-6
+    q, sigma, e = away / h, SMOOTHING[name].in_dimension(1).sigma / h, 1e-6
 
     def w(q):
         if name == "cubic_spline":

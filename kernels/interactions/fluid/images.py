@@ -79,13 +79,15 @@ def own_weight(
 
 
 def force_term(
-    pull: wp.Function, total: int, direction: tuple[float, float, float], sticky: Sticky,
-    precision: Precision, data: Any, params: Any,
+    pull: wp.Function, dragged: wp.Function | None, total: int,
+    direction: tuple[float, float, float], sticky: Sticky, precision: Precision, data: Any,
+    params: Any,
 ) -> Term:  # fmt: skip
     """Term (sum of w x_ij; of 2 d_ja w by place) over a pair and its images.
 
     Args:
         pull: w(i, j, approach, r2, d, p) of one pair (see :mod:`.sph`).
+        dragged: The same of what is along v_ij' instead, without the approach; or None.
         total: Places of walls.
         direction: Of coincident particles.
         sticky: By place, whether the fluid sticks there; None: the approach does not count.
@@ -104,8 +106,10 @@ def force_term(
         *_pulls(total, sticky, "j", "real(2.0) * D_j[{a}]", ["g += g{n}"]),
         "f = x_ij * g + aside",
     ]
+    if dragged is not None:
+        lines += ["f = f + dragged(i, j, r2, d, p) * parting", *_drags(total, sticky, "j")]
     sums = ", ".join([*(f"f[{c}]" for c in range(3)), *(f"b{a}" for a in range(total))])
-    names = {"pull": pull, "direction": precision.vec3(*direction)}
+    names = {"pull": pull, "dragged": dragged, "direction": precision.vec3(*direction)}
     return _term("push_images", lines, sums, 3 + total, total, names, precision, data, params)
 
 
@@ -120,15 +124,21 @@ def press_term(
 
 @functools.cache
 def own_push(
-    pull: wp.Function, total: int, sticky: Sticky, precision: Precision, data: Any, params: Any
-) -> wp.Function:
-    """``own(i, d, p)``: of 2 d_ia w by place the sum over the images of a particle of itself."""
+    pull: wp.Function, dragged: wp.Function | None, total: int, sticky: Sticky,
+    precision: Precision, data: Any, params: Any,
+) -> wp.Function:  # fmt: skip
+    """``own(i, d, p)``: the term of forces over the images of a particle of itself."""
     lines = ["D_i = d.wall[i]", "D_j = D_i", "r2 = real(0.0)", "approach = real(0.0)"]
     if sticky is not None:
-        lines += ["R_i = d.rate[i]", "R_j = R_i", "meeting = approach"]
-    lines += _pulls(total, sticky, "i", "real(2.0) * D_i[{a}]", [])
-    result = f"each({', '.join(f'b{a}' for a in range(total))})"
-    names = {"pull": pull, "each": precision.vector(total)}
+        lines += ["R_i = d.rate[i]", "R_j = R_i", "meeting = approach", "parting = vec3()"]
+    if sticky is not None and any(sticky):
+        lines += ["both = real(2.0) * d.against[i]"]
+    lines += [*_pulls(total, sticky, "i", "real(2.0) * D_i[{a}]", []), "f = vec3()"]
+    if dragged is not None:
+        lines += _drags(total, sticky, "i")
+    numbers = [*(f"f[{c}]" for c in range(3)), *(f"b{a}" for a in range(total))]
+    result = f"sums({', '.join(numbers)})"
+    names = {"pull": pull, "dragged": dragged, "sums": precision.vector(3 + total)}
     header = "own(i: int, d: Data, p: Params)"
     return _function(header, lines, result, total, names, precision, data, params)
 
@@ -139,9 +149,27 @@ def _pair(sticky: Sticky) -> list[str]:
     if sticky is None:
         return [*lines, "approach = real(0.0)"]
     lines += ["R_i = read(d.rate, i)", "R_j = read(d.rate, j)"]
-    lines += ["approach = wp.dot(velocity(d.v, i) - velocity(d.v, j), x_ij)"]
+    lines += ["parting = velocity(d.v, i) - velocity(d.v, j)", "approach = wp.dot(parting, x_ij)"]
     if any(sticky):
-        lines += ["meeting = wp.dot(velocity(d.against, i) + velocity(d.against, j), x_ij)"]
+        lines += ["both = velocity(d.against, i) + velocity(d.against, j)"]
+        lines += ["meeting = wp.dot(both, x_ij)"]
+    return lines
+
+
+def _drags(total: int, sticky: Sticky, j: str) -> list[str]:
+    """Source that adds what drags along v_ij' of every image: to f, and to b where it is mirrored.
+
+    v_ij' is v_i - s v_j, and 2 s d_ja' n_a more for every wall along which the fluid slips.
+    """
+    assert sticky is not None
+    lines = []
+    for n, each in enumerate(sets(total)):
+        square = "".join(f" + e{a}" for a in each)
+        odd = sum(sticky[a] for a in each) % 2 == 1
+        sign = "-real(2.0)" if odd else "real(2.0)"
+        lines.append(f"h{n} = dragged(i, {j}, r2{square}, d, p)")
+        lines.append(f"f = f + h{n} * {'both' if odd else 'parting'}")
+        lines += [f"b{a} += {sign} * R_j[{a}] * h{n}" for a in each if not sticky[a]]
     return lines
 
 
@@ -205,7 +233,7 @@ def keep_press(
         N = o.normal[i]
         f = vec3()
         for k in range(wp.static(first), wp.static(last)):
-            f = f + vec3(N[k, 0], N[k, 1], N[k, 2]) * (found[k] + b[k])
+            f = f + vec3(N[k, 0], N[k, 1], N[k, 2]) * (found[k] + b[3 + k])
         o.pressed[i] = f * d.m[i]
 
     return function(keep_wall_force)
@@ -221,9 +249,10 @@ def add_force(
     def add_walled_force(i: int, particle: int, found: sums, d: data, p: params, o: out):
         a = vec3(found[0], found[1], found[2])
         b = own(i, d, p)
+        a = a + vec3(b[0], b[1], b[2])
         N = o.normal[i]
         for k in range(wp.static(total)):
-            a = a + vec3(N[k, 0], N[k, 1], N[k, 2]) * (found[3 + k] + b[k])
+            a = a + vec3(N[k, 0], N[k, 1], N[k, 2]) * (found[3 + k] + b[3 + k])
         o.f[particle] = o.f[particle] + d.m[i] * a
 
     return function(add_walled_force)

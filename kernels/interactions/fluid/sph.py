@@ -1,4 +1,4 @@
-"""Smoothed particle hydrodynamics: terms of pairs, what is kept of their sums, interpolation.
+"""Smoothed particle hydrodynamics: terms of pairs, and what is kept of their sums.
 
 Two passes over one neighbour list. The first sums the density and keeps each particle's state in
 slot order; the second sums the force from the states of both particles:
@@ -16,8 +16,8 @@ from typing import Any
 
 import warp as wp
 
-from ...engine.loops import Periodicity, Term, box_type, minimum_image, reader
-from ...precision import Precision, function, function_from_source, register
+from ...engine.loops import Term, reader
+from ...precision import Precision, function, function_from_source
 from ...warp_internals import arguments as arguments_of
 
 # Where coincident particles are pushed along, within the line or plane of a lower dimension.
@@ -88,10 +88,11 @@ def keep_state(
 
 
 def pull_function(
-    slope: wp.Function, viscosity: wp.Function | None, precision: Precision, data: Any, params: Any
-) -> wp.Function:
+    slope: wp.Function, viscosity: wp.Function | None, switched: bool, precision: Precision,
+    data: Any, params: Any,
+) -> wp.Function:  # fmt: skip
     """``pull(i, j, approach, r2, d, p)``: w of f_ij / m_i = w x_ij, see :func:`force_term`."""
-    real, state_of = precision.scalar, reader(precision, 4)
+    real, state_of, read = precision.scalar, reader(precision, 4), reader(precision)
     viscous = viscosity is not None
 
     def pull(i: int, j: int, approach: real, distance2: real, d: data, p: params):
@@ -100,7 +101,10 @@ def pull_function(
         stress = state_i[2] + state_j[2]
         if wp.static(viscous):
             mean = real(0.5) * (state_i + state_j)
-            stress += viscosity(approach, distance2, mean[1], mean[3], p)
+            pi_ij = viscosity(approach, distance2, mean[1], mean[3], p)
+            if wp.static(switched):
+                pi_ij *= real(0.5) * (read(d.balsara, i) + read(d.balsara, j))
+            stress += pi_ij
         # In this order no factor leaves the range of float32 before the others bring it back.
         gradient = (state_j[0] * p.sigma) * slope(wp.sqrt(distance2) * p.inverse_h)
         return (-gradient * stress * p.inverse_h) * p.inverse_h
@@ -108,14 +112,39 @@ def pull_function(
     return function(pull)
 
 
+def drag_function(
+    slope: wp.Function, drag: wp.Function, precision: Precision, data: Any, params: Any
+) -> wp.Function:
+    """``dragged(i, j, r2, d, p)``: w of f_ij / m_i = w v_ij, m_j D_ij W_ij' / r."""
+    real, state_of = precision.scalar, reader(precision, 4)
+
+    def dragged(i: int, j: int, r2: real, d: data, p: params):
+        state_i = state_of(d.state, i)
+        state_j = state_of(d.state, j)
+        D = drag(r2, state_i[1], state_j[1], real(0.5) * (state_i[3] + state_j[3]), p)
+        gradient = (state_j[0] * p.sigma) * slope(wp.sqrt(r2) * p.inverse_h)
+        return (gradient * D * p.inverse_h) * p.inverse_h
+
+    return function(dragged)
+
+
 def force_term(
-    pull: wp.Function, moving: bool, dimension: int, precision: Precision, data: Any, params: Any
-) -> Term:
-    """Term f_ij / m_i = -m_j (P_i/rho_i^2 + P_j/rho_j^2 + Pi_ij) grad_i W_ij.
+    pull: wp.Function, dragged: wp.Function | None, moving: bool, dimension: int,
+    precision: Precision, data: Any, params: Any,
+) -> Term:  # fmt: skip
+    """Term f_ij / m_i = -m_j (P_i/rho_i^2 + P_j/rho_j^2 + Pi_ij) grad_i W_ij + w_ij v_ij.
 
     grad W vanishes with r, so coincident particles are taken as h apart along a fixed direction,
-    in the order of their slots: they push each other apart, equally and opposite. ``moving``: the
-    approach counts.
+    in the order of their slots: they push each other apart, equally and opposite.
+
+    Args:
+        pull: Of the first part (see :func:`pull_function`).
+        dragged: Of the second; None: there is none, and the term is central.
+        moving: The approach counts.
+        dimension: Of the fluid.
+        precision: Of the simulation.
+        data: Struct with ``state`` and, where it moves, ``v``.
+        params: Struct of the fluid's parameters.
     """
     real, vec3, pair2 = precision.scalar, precision.vec3, precision.vector(2)
     velocity_of = reader(precision, 3)
@@ -130,21 +159,35 @@ def force_term(
         w = pull(i, j, approach, distance2, d, p)
         return pair2(w, wp.where(apart, real(0.0), side * w))
 
-    return Term(function(push), 3, DIRECTIONS[dimension], "fused")
+    along = function(push)
+    if dragged is None:
+        return Term(along, 3, DIRECTIONS[dimension], "fused")
+    aside = vec3(*DIRECTIONS[dimension])
+
+    def push_and_drag(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
+        t = along(i, j, x_ij, r2, d, p)
+        v_ij = velocity_of(d.v, i) - velocity_of(d.v, j)
+        return t[0] * x_ij + t[1] * aside + dragged(i, j, r2, d, p) * v_ij
+
+    return Term(function(push_and_drag), 3, None, "fused")
 
 
 def heat_term(
-    slope: wp.Function, viscosity: wp.Function | None, dimension: int, kicks: int,
+    slope: wp.Function, laws: Mapping[str, wp.Function], switched: bool, dimension: int, kicks: int,
     precision: Precision, data: Any, params: Any,
 ) -> Term:  # fmt: skip
     """Term m_j (P_i/rho_i^2 + Pi_ij/2) u_ij . grad_i W_ij of heat, at the mean velocities of kicks.
+
+    A drag heats by -w_ij v_ij . u_ij / 2.
 
     Coincident particles are taken as h apart, as by the force.
     """
     real, vec3, result = precision.scalar, precision.vec3, precision.vector(kicks)
     state_of, vector_of = reader(precision, 4), reader(precision, 3)
-    aside = vec3(*DIRECTIONS[dimension])
-    viscous, both = viscosity is not None, kicks == 2
+    aside, read = vec3(*DIRECTIONS[dimension]), reader(precision)
+    viscosity, both = laws.get("term"), kicks == 2
+    viscous, drags = viscosity is not None, "drag" in laws
+    dragged = drag_function(slope, laws["drag"], precision, data, params) if drags else None
 
     def warm(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
         apart = r2 > p.closest_squared
@@ -158,13 +201,18 @@ def heat_term(
             v_ij = vector_of(d.v, i) - vector_of(d.v, j)
             mean = real(0.5) * (state_i + state_j)
             term = viscosity(wp.dot(v_ij, x_ij), distance2, mean[1], mean[3], p)
+            if wp.static(switched):
+                term *= real(0.5) * (read(d.balsara, i) + read(d.balsara, j))
             stress += real(0.5) * term
         gradient = (state_j[0] * p.sigma) * slope(wp.sqrt(distance2) * p.inverse_h)
-        g = (gradient * stress * p.inverse_h) * p.inverse_h
+        g = (gradient * stress * p.inverse_h) * p.inverse_h * along
+        if wp.static(drags):
+            w_ij = dragged(i, j, r2, d, p)
+            g -= (real(0.5) * w_ij) * (vector_of(d.v, i) - vector_of(d.v, j))
         rate = result()
-        rate[0] = g * wp.dot(vector_of(d.u0, i) - vector_of(d.u0, j), along)
+        rate[0] = wp.dot(vector_of(d.u0, i) - vector_of(d.u0, j), g)
         if wp.static(both):
-            rate[1] = g * wp.dot(vector_of(d.u1, i) - vector_of(d.u1, j), along)
+            rate[1] = wp.dot(vector_of(d.u1, i) - vector_of(d.u1, j), g)
         return rate
 
     return Term(function(warm), kicks)
@@ -173,11 +221,15 @@ def heat_term(
 def virial_term(force: Term, precision: Precision, data: Any, params: Any) -> Term:
     """Term x_ij . f_ij / 2, the particle's share of the virial."""
     real, vec3, one = precision.scalar, precision.vec3, precision.vector(1)
-    push = force.function
+    push, central = force.function, force.direction is not None
 
     def add_virial(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
         t = push(i, j, x_ij, r2, d, p)
-        return one(real(0.5) * d.m[i] * t[0] * wp.dot(x_ij, x_ij))
+        if wp.static(central):
+            w = t[0] * wp.dot(x_ij, x_ij)
+        else:
+            w = wp.dot(t, x_ij)
+        return one(real(0.5) * d.m[i] * w)
 
     return Term(function(add_virial), 1)
 
@@ -209,52 +261,3 @@ def keep_measure(
         o.virial[particle] = o.virial[particle] + wp.float64(total[0])
 
     return function(keep)
-
-
-@functools.cache
-def interpolation_kernel(
-    weight: wp.Function, precision: Precision, periodic: Periodicity, params: Any, own: bool = False
-) -> wp.Kernel:
-    """Kernel: sum_j V_j A_j W(r - r_j, h) and sum_j V_j W(r - r_j, h) at each point r.
-
-    ``samples`` are (V_j A_j, V_j), the volumes being m_j / rho_j; ``sizes`` (1/h_j, sigma/h_j^d)
-    where particles have lengths of their own.
-    """
-    real, vec3, vec4, Box = (
-        precision.scalar, precision.vec3, precision.vector(4), box_type(precision),
-    )  # fmt: skip
-    image, vec2 = minimum_image(precision, periodic), precision.vector(2)
-
-    @register
-    def interpolate(
-        first: int,
-        grid: wp.uint64,
-        world: int,
-        box: wp.array(dtype=Box),
-        parameters: wp.array(dtype=params),
-        x: wp.array(dtype=vec3),
-        samples: wp.array(dtype=vec4),
-        sizes: wp.array(dtype=vec2),
-        points: wp.array(dtype=vec3),
-        u: wp.array(dtype=vec3),
-        sums_out: wp.array(dtype=vec4),
-    ):
-        k = first + wp.tid()
-        p = parameters[world]
-        total = vec4()
-        j = int(0)
-        candidates = wp.hash_grid_query(grid, u[k], real(1.0))
-        while wp.hash_grid_query_next(candidates, j):
-            x_ij = image(points[k] - x[j], box[world])
-            r2 = wp.dot(x_ij, x_ij)
-            if r2 < p.cutoff_squared:
-                r = wp.sqrt(r2)
-                if wp.static(own):
-                    total += samples[j] * (weight(r * sizes[j][0]) * sizes[j][1])
-                else:
-                    total += samples[j] * weight(r * p.inverse_h)
-        if wp.static(not own):
-            total *= p.sigma
-        sums_out[k] = total
-
-    return interpolate

@@ -103,7 +103,7 @@ class Integrator:
             model.vectorised,
         )  # fmt: skip
         self.go_on = go_on_kernel(model.precision, model.periodic, settings.compensated, remember)
-        self.motion = _motion(model, state)
+        self.motion = motion_of(model, state)
 
     @property
     def name(self) -> str:
@@ -190,7 +190,8 @@ class Integrator:
         launch(kernel, self.count, [*scalars, self.motion], self.model.device)
 
 
-def _motion(model: Model, state: State) -> Any:
+def motion_of(model: Model, state: State) -> Any:
+    """What integration touches, of the arrays that there are."""
     motion = motion_type(model.precision)()
     names = {
         "x": "position", "v": "velocity", "w": "inverse_mass", "f": "force",

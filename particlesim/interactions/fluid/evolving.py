@@ -14,7 +14,7 @@ from ...engine.state import State
 from ...scene.part import Interaction, Part
 from .heat import ENERGY, Heat
 from .lengths import LENGTH, AdaptiveSmoothing, Lengths
-from .smoothing import SUPPORT, Smoothing
+from .smoothing.smoothing_function import Smoothing
 from .walls import Walls
 
 
@@ -44,11 +44,12 @@ class Evolving(Interaction):
     def take_length(self, given: Any) -> dict[str, float]:
         """The parameter that smoothing lengths follow from."""
         if isinstance(given, AdaptiveSmoothing):
-            self.adaptive, self.cutoff = given, SUPPORT * (given.largest or np.inf)
+            self.adaptive = given
+            self.cutoff = self.smoothing.support * (given.largest or np.inf)
             self.requires |= {LENGTH}
             return {"eta": given.eta}
         h = validate.number(self.name, LENGTH, given, above=0.0, unit="length")
-        self.cutoff = SUPPORT * h
+        self.cutoff = self.smoothing.support * h
         return {LENGTH: h}
 
     def check_range(self, h: np.ndarray, closest_squared: np.ndarray) -> None:

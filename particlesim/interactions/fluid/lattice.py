@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...engine.model import Model
-from .smoothing import SUPPORT, Smoothing
+from .smoothing.smoothing_function import Smoothing
 
 LOOKED_AT, EVEN = 16, 1e-3  # particles, and how far they may be off the spacing
 FIT = 0.25  # a sum that is farther from 1 is that of a smoothing length that does not fit
@@ -26,9 +26,10 @@ def lattice_sum(smoothing: Smoothing, dimension: int, ratio: float) -> float:
     """
     if not 0.5 < ratio < 16.0:
         return 1.0
-    n = np.arange(-math.ceil(SUPPORT * ratio), math.ceil(SUPPORT * ratio) + 1)
+    reach = smoothing.support * ratio
+    n = np.arange(-math.ceil(reach), math.ceil(reach) + 1)
     square = functools.reduce(np.add.outer, [n**2.0] * dimension)
-    counts = np.unique(square[square < (SUPPORT * ratio) ** 2], return_counts=True)
+    counts = np.unique(square[square < reach**2], return_counts=True)
     total = sum(
         count * float(smoothing.weight(math.sqrt(r2) / ratio))
         for r2, count in zip(*counts, strict=True)

@@ -19,7 +19,6 @@ from ...engine.state import State
 from ...kernels.interactions.fluid import lengths as kernels
 from ..pair_loop import PairLoop
 from .guess import guessed_lengths
-from .smoothing import SUPPORT
 
 LENGTH = "smoothing_length"  # the array of the state
 LARGEST, SMALLEST = 4.0, 1e-3  # of the largest at the start, and of the largest that there may be
@@ -72,7 +71,7 @@ class Lengths:
     """
 
     def __init__(self, fluid: Any, model: Model):
-        self.fluid, self.model = fluid, model
+        self.fluid, self.model, self.support = fluid, model, fluid.smoothing.support
         self.members = model.members([peer.group for peer in fluid.peers], fluid.name)
         self.dimension, worlds = fluid.dimension, range(model.world_count)
         world, mass = model.world_of[self.members], model.column("mass")
@@ -90,13 +89,13 @@ class Lengths:
             self.most[w] = min(self.most[w], *(0.25 * side for side in sides), np.inf)
         self.least = SMALLEST * self.most
         first[self.members] = np.minimum(first[self.members], self.most[world])
-        self.reach = OwnReach(LENGTH, SUPPORT, GROWTH, first, SUPPORT * self.most)
+        self.reach = OwnReach(LENGTH, self.support, GROWTH, first, self.support * self.most)
 
     def request(self, neighbors: Neighbors, names: set[str]) -> VerletList:
         """The list of the fluid."""
         fluid = self.fluid
         pairs = neighbors.request(
-            fluid.name, self.members, SUPPORT * self.most, {"position", *names}, own=self.reach
+            fluid.name, self.members, self.support * self.most, {"position", *names}, own=self.reach
         )
         assert isinstance(pairs, VerletList)  # as there is a cutoff
         self.pairs = pairs
@@ -138,7 +137,7 @@ class Lengths:
             slots: For what forces read.
         """
         pairs, device = self.pairs, self.model.device
-        inputs = [pairs.order, pairs.world, self.bounds, SUPPORT, self.reach.reach,
+        inputs = [pairs.order, pairs.world, self.bounds, self.support, self.reach.reach,
                   state[LENGTH], self.bracket, self.following, self.found]  # fmt: skip
         launch(self.kernels.begin, pairs.count, inputs, device)
         store = functools.partial(
@@ -172,7 +171,8 @@ class Lengths:
             fluid.sum_density(state)
             h = state[LENGTH].numpy()[self.members]
             reach = self.reach.reach.numpy()[self.members]
-            short = (SUPPORT * h > nearly * reach) & (reach < nearly * SUPPORT * self.most[world])
+            most = self.support * self.most[world]
+            short = (self.support * h > nearly * reach) & (reach < nearly * most)
             if not (short.any() or self.searching.numpy()[0]):
                 break
         self.pairs.renew(state, list(worlds))
@@ -193,7 +193,7 @@ class Lengths:
 
     def widest(self, slots: slice) -> float:
         """How far the particle among these slots reaches that reaches farthest [length]."""
-        return float(SUPPORT * 1.001 * self.following.numpy()[slots].max())
+        return float(self.support * 1.001 * self.following.numpy()[slots].max())
 
     def at_bound(self) -> np.ndarray:
         """Whether each member has the largest length that there is."""

@@ -9,8 +9,9 @@ import numpy as np
 
 from ...engine.limit import Limit
 from ...engine.probe import Probe
-from .smoothing import SUPPORT, Smoothing
-from .viscosities import ArtificialViscosity
+from ...kernels.interactions.fluid.viscosity import SHIFT
+from .smoothing.smoothing_function import Smoothing
+from .viscosities import ArtificialViscosity, ParticleShifting
 
 ACCELERATION = 0.25
 ADVISED = 0.4  # of h / c, for accuracy (Monaghan 1992)
@@ -27,6 +28,7 @@ def fluid_limits(part: Any, probe: Probe) -> list[Limit]:
       (:func:`damping`), mu being the speed at which the fastest meets a typical particle; that of
       another viscosity is asked of its force.
     - acceleration: 0.25 sqrt(h / |a|) (Monaghan 1992).
+    - shifting: 2 over the rate at which :class:`ParticleShifting` evens out the concentration.
     """
     rows = part.pairs.members_host
     if not len(rows):
@@ -49,16 +51,34 @@ def fluid_limits(part: Any, probe: Probe) -> list[Limit]:
         reason = f"0.25 sqrt(h / a), h = {h[k]:.4g}, a = {a[k]:.4g}"
         dt = ACCELERATION * float(np.sqrt(h[k] / a[k]))
         limits.append(Limit(part.name, "acceleration", dt, reason, *probe.place(int(rows[k]))))
-    return limits
+    return limits + _shifting_limit(part, probe, each)
+
+
+def _shifting_limit(part: Any, probe: Probe, each: dict[str, np.ndarray]) -> list[Limit]:
+    """Of x' = -lambda x, lambda = 8 U / h kappa^2 W_hat (1 - W_hat / 2) of a wave: 2 / lambda.
+
+    Volumes follow the density, whose wave is W_hat of that of the places; half of it is a mean's.
+    """
+    if not any(isinstance(viscosity, ParticleShifting) for viscosity in part.viscosity):
+        return []
+    speed, h = each["viscosity_speed"], each["smoothing_length"]
+    k = int(np.argmax(speed / h))
+    w = transform(part.smoothing, part.dimension)
+    rate = SHIFT * float(speed[k] / h[k] * np.abs(WAVENUMBERS**2 * w * (1.0 - 0.5 * w)).max())
+    if rate == 0.0:
+        return []
+    row = int(part.pairs.members_host[k])
+    return [Limit(part.name, "shifting", 2.0 / rate, f"rate {rate:.4g} /s", *probe.place(row))]
 
 
 def _damping_rates(
     part: Any, probe: Probe, each: dict[str, np.ndarray], c: np.ndarray
 ) -> np.ndarray:
     """gamma of every member."""
-    if part.viscosity is None:
+    forces = [each for each in part.viscosity if each.laws]
+    if not forces:
         return np.zeros_like(c)
-    if not isinstance(part.viscosity, ArtificialViscosity):
+    if not (len(forces) == 1 and isinstance(forces[0], ArtificialViscosity)):
         return np.full_like(c, probe.damping(part))
     speed = probe.relative_speed(part.pairs.members_host)
     meeting = speed.max() + np.sqrt((speed**2).mean())
@@ -66,12 +86,14 @@ def _damping_rates(
     return damping(part.smoothing, part.dimension) * strength / each["smoothing_length"]
 
 
-@functools.cache
 def steepest(smoothing: Smoothing, dimension: int) -> float:
-    """max of kappa W_hat(kappa), kappa = k h: the largest omega is that times c / h.
+    """max of kappa W_hat(kappa), kappa = k h: the largest omega is that times c / h."""
+    return float(np.abs(WAVENUMBERS * transform(smoothing, dimension)).max())
 
-    W_hat(k) = int W cos(k.x) d^dx, 1 at k = 0.
-    """
+
+@functools.cache
+def transform(smoothing: Smoothing, dimension: int) -> np.ndarray:
+    """W_hat(k) = int W cos(k.x) d^dx, 1 at k = 0, at ``WAVENUMBERS`` / h."""
     q, w = _samples(smoothing)
     angles = WAVENUMBERS[:, None] * q
     if dimension == 1:
@@ -81,27 +103,24 @@ def steepest(smoothing: Smoothing, dimension: int) -> float:
         shell = 2.0 * np.pi * q * np.cos(angles[..., None] * np.cos(turn)).mean(axis=-1)
     else:
         shell = 4.0 * np.pi * q**2 * np.sinc(angles / np.pi)
-    transform = (shell * w).sum(axis=1) * SUPPORT / POINTS
-    return float(np.abs(WAVENUMBERS * transform).max())
+    return (shell * w).sum(axis=1) * smoothing.support / POINTS
 
 
 @functools.cache
 def damping(smoothing: Smoothing, dimension: int) -> float:
     """D of gamma = D (alpha c + 2 beta mu) / h, an upper bound by Gershgorin's circles.
 
-    A pair that approaches damps v_ij along x_ij at the rate m h (alpha c + 2 beta mu) |W'| / (rho
-    r). Summed over all neighbours, 1/d of each along a direction, twice for the row of the matrix:
-    D = 2/d int |W'| / r d^dx h^2, which by parts is an integral over W itself.
+    A pair that approaches damps v_ij along x_ij at the rate m h (alpha c + 2 beta mu) |W'| r / (rho
+    (r^2 + 0.01 h^2)). Summed over all neighbours, 1/d of each along a direction, twice for the row
+    of the matrix: D = 2/d int |W'| r / (r^2 + 0.01 h^2) d^dx h^2.
     """
     q, w = _samples(smoothing)
     surface = {1: 2.0, 2: 2.0 * np.pi, 3: 4.0 * np.pi}[dimension]
-    slope = np.abs(np.gradient(w, q))
-    return float(
-        2.0 / dimension * surface * (slope * q ** (dimension - 2)).sum() * SUPPORT / POINTS
-    )
+    rate = np.abs(np.gradient(w, q)) * q**dimension / (q**2 + 0.01)
+    return float(2.0 / dimension * surface * rate.sum() * smoothing.support / POINTS)
 
 
 def _samples(smoothing: Smoothing) -> tuple[np.ndarray, np.ndarray]:
     """Midpoints q and W h^d there."""
-    q = (np.arange(POINTS) + 0.5) * SUPPORT / POINTS
-    return q, smoothing.sigma * np.array([float(smoothing.weight(float(each))) for each in q])
+    q = (np.arange(POINTS) + 0.5) * smoothing.support / POINTS
+    return q, smoothing.sigma * smoothing.at(q)

@@ -66,7 +66,8 @@ def _of_lengths(fluid: Any) -> str:
 def _of_density(fluid: Any, members: np.ndarray, columns: dict[str, np.ndarray]) -> str:
     rho = _densities(fluid)[members]
     h, mass = columns["smoothing_length"], fluid.model.column("mass")[members]
-    alone = float(np.median(mass * fluid.smoothing.sigma / h**fluid.dimension / rho))
+    own = fluid.smoothing.sigma * fluid.smoothing.center
+    alone = float(np.median(mass * own / h**fluid.dimension / rho))
     asked = any("rest_density" in each.parameters for each in fluid.equation_of_state.laws.values())
     share = float(np.percentile(rho / columns["rest_density"], DENSE)) if asked else 1.0
     fits = LEAST_DENSE < share < MOST_DENSE

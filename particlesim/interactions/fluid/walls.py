@@ -131,9 +131,9 @@ class Walls:
         own = model.precision, self.loop.Data, self.loop.Params
         self.density_term = images.density_term(fluid.weight, total, *own)
         self.own_weight = images.own_weight(fluid.weight, total, *own)
-        pull, direction = fluid.pull(*own), DIRECTIONS[fluid.dimension]
-        self.force_term = images.force_term(pull, total, direction, self.sticky, *own)
-        self.own_push = images.own_push(pull, total, self.sticky, *own)
+        pairs, direction = (fluid.pull(*own), fluid.dragged(*own)), DIRECTIONS[fluid.dimension]
+        self.force_term = images.force_term(*pairs, total, direction, self.sticky, *own)
+        self.own_push = images.own_push(*pairs, total, self.sticky, *own)
 
     def look(self) -> None:
         """Find how far the walls are from where particles are now."""

@@ -26,7 +26,7 @@ def weights(points, x, density, m, box=None):
     d = d if box is None else d - box * np.round(d / box)
     q = np.linalg.norm(d, axis=2) / H
     w = np.maximum(1 - q / 2, 0) ** 4 * (1 + 2 * q)
-    return m / density * SMOOTHING["wendland_c2"][3].sigma / H**3 * w
+    return m / density * SMOOTHING["wendland_c2"].in_dimension(3).sigma / H**3 * w
 
 
 def build(count=400, periodic=None, **options):

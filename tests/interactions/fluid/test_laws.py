@@ -1,14 +1,12 @@
-"""The laws of SPH alone: smoothing functions, equations of state, viscosity."""
+"""The laws of SPH alone: equations of state, viscosity."""
 
 import numpy as np
 import pytest
 import warp as wp
 
 import particlesim as ps
-from particlesim.interactions.fluid.smoothing import SMOOTHING
 from particlesim.kernels.precision import PRECISIONS, function_from_source
 
-FUNCTIONS = [(name, dimension) for name in SMOOTHING for dimension in (1, 2, 3)]
 EPSILON = {"float32": 2.0**-24, "float64": 2.0**-53}
 STEP = 1e-5  # of central differences, which err by STEP^2 / 6 of the third derivative
 
@@ -37,46 +35,6 @@ def evaluate(law, *columns, precision="float64"):
 def derivative(f, x):
     """Central difference."""
     return (f(x + STEP) - f(x - STEP)) / (2 * STEP)
-
-
-@pytest.mark.parametrize("name, dimension", FUNCTIONS)
-def test_smoothing_function_integrates_to_one(name, dimension):
-    function = SMOOTHING[name][dimension]
-    # Gauss's rule of 8 nodes is exact to degree 15; the pieces [0, 1] and [1, 2] have 5 + 2.
-    nodes, weights = np.polynomial.legendre.leggauss(8)
-    q = np.concatenate([(nodes + 1) / 2, (nodes + 3) / 2])
-    surface = {1: 2.0, 2: 2 * np.pi * q, 3: 4 * np.pi * q**2}[dimension]
-    integral = (evaluate(function.weight, q) * surface * np.tile(weights, 2) / 2).sum()
-    assert function.sigma * integral == pytest.approx(1, rel=1e-14)
-
-
-@pytest.mark.parametrize("name, dimension", FUNCTIONS)
-def test_slope_is_the_derivative_of_the_weight(name, dimension):
-    function = SMOOTHING[name][dimension]
-    q = np.linspace(0.01, 2.5, 500)
-    expected = derivative(lambda q: evaluate(function.weight, q), q)
-    # The third derivative is at most 15, and the round-off of the difference 2^-53 / STEP.
-    error = evaluate(function.slope, q) * q - expected
-    assert np.abs(error).max() < 15 / 6 * STEP**2 + 2e-11
-
-
-@pytest.mark.parametrize("name, dimension", FUNCTIONS)
-def test_smoothing_function_ends_at_its_support_and_is_finite_at_zero(name, dimension):
-    function = SMOOTHING[name][dimension]
-    beyond = np.array([2.0, 2.1, 1e6])
-    assert np.all(evaluate(function.weight, beyond) == 0)
-    assert np.all(evaluate(function.slope, beyond) == 0)
-    assert evaluate(function.weight, [0.0, 1e-300])[0] > 0
-    assert np.all(evaluate(function.slope, [0.0, 1e-300]) < 0)
-
-
-@pytest.mark.parametrize("name, dimension", FUNCTIONS)
-def test_smoothing_function_in_float32(name, dimension):
-    q = np.linspace(0, 2.2, 300)
-    for law in (SMOOTHING[name][dimension].weight, SMOOTHING[name][dimension].slope):
-        # Seven operations on values up to 5, and q itself rounded at a slope up to 7.5.
-        error = evaluate(law, q, precision="float32") - evaluate(law, q)
-        assert np.abs(error).max() < (7 * 5 + 2 * 7.5) * EPSILON["float32"]
 
 
 EQUATIONS = [

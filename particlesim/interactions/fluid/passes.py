@@ -1,0 +1,200 @@
+"""The passes of a fluid over its neighbours: density, then forces."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, cast
+
+import numpy as np
+import warp as wp
+
+from ...engine.limit import Limit
+from ...engine.model import Model
+from ...engine.neighbors.lists import Neighbors
+from ...engine.neighbors.verlet import VerletList
+from ...engine.probe import Probe
+from ...engine.state import State
+from ...kernels.interactions.fluid import lengths as of_lengths
+from ...kernels.interactions.fluid import sph as kernels
+from ..pair_loop import PairLoop
+from .equations_of_state import EquationOfState
+from .evolving import Evolving
+from .heat import ENERGY, Heat, check_energies
+from .lattice import lattice_sums, spacings
+from .lengths import LENGTH, Lengths
+from .limits import fluid_limits
+from .starts import complaint
+from .viscosities import Viscosity
+from .viscous_passes import Drift, Switch
+from .walls import Pass, Walls
+
+COINCIDENT = 1e-6  # closer than this, in parts of h, particles count as coincident
+
+
+class Passes(Evolving):
+    """The engine's side of :class:`~particlesim.SPH`, which describes a fluid."""
+
+    equation_of_state: EquationOfState
+    viscosity: tuple[Viscosity, ...]
+    parameters: dict[str, Any]
+    sources: dict[str, dict[str, str]]
+
+    def variables(self, name: str) -> tuple[str, ...]:
+        """What a law is called with."""
+        raise NotImplementedError
+
+    def prepare(self, model: Model, neighbors: Neighbors) -> None:
+        self.model = model
+        columns = self.columns(self.parameters)
+        read = {"velocity": bool(self.viscosity), ENERGY: self.hot}
+        names = {"mass"} | {name for name, on in read.items() if on}
+        if self.adaptive is None:
+            self.pairs = cast(VerletList, neighbors.of(self, names))  # as there is a cutoff
+            least = most = columns[LENGTH]
+        else:
+            self.lengths = Lengths(self, model)
+            self.pairs = self.lengths.request(neighbors, names)
+            columns |= self.lengths.columns()
+            least, most = self.lengths.least, self.lengths.most
+        if self.hot:
+            check_energies(self.name, model, self.pairs.members_host)
+        self.walls = Walls(self, model)
+        self.requires = self.requires | self.walls.requires
+        columns |= {"cutoff_squared": (self.smoothing.support * most) ** 2}
+        columns |= {"closest_squared": (COINCIDENT * least) ** 2}
+        for h in (least, most):
+            self.check_range(h, columns["closest_squared"])
+        self.spacings = spacings(self, model)
+        if self.lengths is None:
+            columns |= {"inverse_h": 1.0 / h, "sigma": self.smoothing.sigma / h**self.dimension}
+            if "rest_density" in columns:
+                columns["rest_density"] = columns["rest_density"] * lattice_sums(self, model, h)
+        model.fits(self.name, {name: columns[name] for name in self.parameters})
+        self.Params, self.params = model.parameters("FluidParameters", columns)
+
+    def attach(self, model: Model, state: State) -> None:
+        precision, held = model.precision, self.pairs.fields
+        # Mass, density, P / rho^2 and sound speed of each slot, together as they are read together.
+        self.slot_state = self.pairs.array(precision.vector(4))
+        fields = {"x": held["position"], "m": held["mass"], "state": self.slot_state}
+        if self.viscosity:
+            fields["v"] = held["velocity"]
+        if self.hot:
+            fields["u"] = held[ENERGY]
+        if self.lengths is not None:
+            self.lengths.attach(state)
+            fields["size"] = self.lengths.size
+        self.switch = Switch(self) if any(each.switched for each in self.viscosity) else None
+        if self.switch:
+            fields["balsara"] = self.switch.values
+        drifts = (Drift(self, state, each) for each in self.viscosity if each.drifts)
+        self.drift = next(drifts, None)
+        self.fields, self.state = fields, state
+        self.loop = PairLoop.over(model, self.pairs, "Fluid", fields, self.Params, self.params)
+        self.laws = self._laws()
+        self.weight = self.smoothing.weight.function(precision)
+        self.slope = self.smoothing.slope.function(precision)
+        self._make_terms()
+        if self.walls:
+            self.walls.attach(state, fields)
+
+    def _make_terms(self) -> None:
+        self._types = types = self.model.precision, self.loop.Data, self.Params
+        if self.lengths is not None:
+            viscous = self.slope, self.laws.get("term"), self.dimension
+            heat = functools.partial(of_lengths.heat_term, *viscous)
+            self.force_term = of_lengths.force_term(*viscous, *types)
+        else:
+            given = self.slope, self.laws, self.switch is not None, self.dimension
+            heat = functools.partial(kernels.heat_term, *given)
+            self.density_term = kernels.density_term(self.weight, *types)
+            pull, dragged = self.pull(*types), self.dragged(*types)
+            moving = bool(self.viscosity)
+            self.force_term = kernels.force_term(pull, dragged, moving, self.dimension, *types)
+        if self.hot:
+            self.heat = Heat(self, self.state, heat)
+        if self.lengths is not None:
+            self.lengths.over(self.loop, self.weight, self.slope)
+            self.lengths.start()
+
+    def pull(self, *types: Any) -> wp.Function:
+        """How strongly a pair pulls, for precision, data and parameters of these types."""
+        term, switched = self.laws.get("term"), self.switch is not None
+        return kernels.pull_function(self.slope, term, switched, *types)
+
+    def dragged(self, *types: Any) -> wp.Function | None:
+        """How strongly a pair drags; None: it does not."""
+        if "drag" not in self.laws:
+            return None
+        return kernels.drag_function(self.slope, self.laws["drag"], *types)
+
+    def _laws(self) -> dict[str, wp.Function]:
+        """The parts' laws as functions of their variables and the fluid's parameters."""
+        precision = self.model.precision
+        return {
+            name: kernels.bound_law(
+                name, law.function(precision, part.name, float), self.variables(name),
+                self.sources[name], precision, self.Params,
+            )
+            for part in (self.equation_of_state, *self.viscosity)
+            for name, law in part.laws.items()
+        }  # fmt: skip
+
+    def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        self.sum_density(state)
+        out = {"f": state.force}
+        self.walls.sum_force(Pass(self.loop, self.force_term, kernels.add_force, out))
+        if self.drift:
+            self.drift.sum()
+
+    def advance(self, state: State, dt: float) -> None:
+        super().advance(state, dt)
+        if self.drift:
+            self.drift.move(dt)
+
+    def sum_density(self, state: State, sounds: bool = False) -> None:
+        """Density, pressure and their slots; speeds of sound for a viscosity, or if asked for."""
+        sounds = sounds or bool(self.viscosity)
+        laws = self.laws["pressure"], self.laws["sound_speed"] if sounds else None
+        if self.lengths is not None:
+            self.lengths.search(state, laws, self.slot_state)
+            return
+        out = {"state": self.slot_state, "rho": state.density, "pressure": state.pressure}
+        own = kernels.own_weight(self.weight, *self._types)
+        store = functools.partial(kernels.keep_state, own, *laws, self.hot)
+        self.walls.sum_density(Pass(self.loop, self.density_term, store, out), (*laws, self.hot))
+        if self.switch:
+            self.switch.sum()
+
+    def limits(self, probe: Probe) -> list[Limit]:
+        """By sound with viscosity, and by acceleration."""
+        return fluid_limits(self, probe)
+
+    def complaint(self) -> str:
+        """That masses, the smoothing length or the speed of sound do not fit the start."""
+        return complaint(self)
+
+    def sound_speeds(self, probe: Probe) -> np.ndarray:
+        """Speed of sound at the present densities, of each member [length/time]."""
+        probe.force([self])
+        if not self.viscosity:  # whose passes have no need of it
+            self.sum_density(probe.state, sounds=True)
+        c = np.empty(self.pairs.count)
+        members = self.pairs.members_host
+        c[np.searchsorted(members, self.pairs.order.numpy())] = self.slot_state.numpy()[:, 3]
+        return c
+
+    def update_density(self) -> None:
+        """Density, pressure and their slots at the present positions; not within a substep."""
+        self.pairs.update(self.state)
+        self.pairs.grow()
+        self.look_at_density(self.state)
+
+    def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
+        """Add the energy m u at the present positions, and the virial of all pair forces."""
+        self.look_at_density(state)
+        precision, energy_law = self.model.precision, self.laws["energy"]
+        term = kernels.virial_term(self.force_term, precision, self.loop.Data, self.Params)
+        keep = (kernels if self.lengths is None else of_lengths).keep_measure
+        store = functools.partial(keep, energy_law, self.hot)
+        self.loop.sum(term, store, {"energy": energy, "virial": virial})
