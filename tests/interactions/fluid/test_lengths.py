@@ -209,6 +209,14 @@ def test_bits_of_every_way(integrator, precision, tmp_path):
     for sim in (together, loaded):
         sim.run(4)
     assert np.array_equal(together.position, loaded.position)
+    other = together.world(1).position
+    for sim in (together, loaded):
+        if sim is together:
+            # What is written in one world is nothing to another.
+            sim.world(0).position = 0.9 * sim.world(0).position
+        sim.run(2)
+    assert np.array_equal(together.world(1).position, loaded.world(1).position)
+    assert not np.array_equal(together.world(1).position, other)
     found = []
     for execution, threads in [("graph", 1), ("threads", 1), ("threads", 2)]:
         sim = run(cloud(3000), execution=execution, threads=threads)
