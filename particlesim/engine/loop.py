@@ -25,7 +25,7 @@ from .neighbors.lists import Neighbors
 from .observers import EXCHANGE, FINISH, FOLLOW, FORCE, PROJECT, Observers
 from .state import State
 
-LEFT_BY_FORCES = ("force", "density", "pressure")
+LEFT_BY_FORCES = ("force", "density", "pressure", "smoothing_length")
 
 Fuse = Callable[[Sequence[Interaction]], list[Interaction]]
 

@@ -16,7 +16,7 @@ from .renewal import blocks_type, cells_type
 
 @functools.cache
 def row_functions(
-    precision: Precision, periodic: Periodicity, own: bool
+    precision: Precision, periodic: Periodicity, own: bool = False
 ) -> tuple[wp.Function, wp.Function]:
     """Two functions that append to the row of slot i, which holds n entries.
 

@@ -53,21 +53,24 @@ class EquationOfState(FluidPart):
     particles have it as an attribute, and it goes on in time, as of :class:`IdealGas`.
 
     Example:
+        A liquid that answers to compression in proportion, P = c^2 (rho - rho0):
+
         >>> @law
-        ... def pressure(density: float, speed: float):
-        ...     return speed * speed * density
+        ... def pressure(density: float, rest_density: float, speed: float):
+        ...     return speed * speed * (density - rest_density)
         >>> @law
         ... def energy(density: float, rest_density: float, speed: float):
-        ...     return speed * speed * wp.log(density / rest_density)
+        ...     s = density / rest_density
+        ...     return speed * speed * (wp.log(s) + 1.0 / s - 1.0)
         >>> @law
         ... def sound_speed(speed: float):
         ...     return speed
-        >>> class Isothermal(EquationOfState):
+        >>> class Linear(EquationOfState):
         ...     pressure, energy, sound_speed = pressure, energy, sound_speed
         ...     def __init__(self, speed):
         ...         self.parameters = {"speed": speed}
-        >>> gas = SPH(smoothing_length=0.1, rest_density=1.0, equation_of_state=Isothermal(300.0))
-        >>> sorted(gas.parameters)
+        >>> oil = SPH(smoothing_length=0.1, rest_density=1.0, equation_of_state=Linear(30.0))
+        >>> sorted(oil.parameters)
         ['rest_density', 'smoothing_length', 'state_speed']
     """
 

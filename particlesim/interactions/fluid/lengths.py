@@ -21,6 +21,7 @@ from ..pair_loop import PairLoop
 from .guess import guessed_lengths
 
 LENGTH = "smoothing_length"  # the array of the state
+FOUND = (LENGTH, "density", "pressure")  # with the forces
 LARGEST, SMALLEST = 4.0, 1e-3  # of the largest at the start, and of the largest that there may be
 GROWTH = 1.1  # of a length until its row is made anew, which it is from half of that on
 PASSES = 8  # in a substep; one where nothing has moved, three in motion
@@ -164,7 +165,8 @@ class Lengths:
     def settle(self, worlds: Sequence[int]) -> None:
         """Lengths that fit the present positions of these worlds, however far they are off."""
         fluid, state, world = self.fluid, self.state, self.model.world_of[self.members]
-        nearly = 1 - 1e-4
+        nearly, mine = 1 - 1e-4, np.isin(world, list(worlds))
+        before = {name: state[name].numpy().copy() for name in FOUND}
         for _ in range(RENEWALS):
             self.pairs.renew(state, list(worlds))
             self.pairs.update(state)
@@ -173,8 +175,13 @@ class Lengths:
             reach = self.reach.reach.numpy()[self.members]
             most = self.support * self.most[world]
             short = (self.support * h > nearly * reach) & (reach < nearly * most)
-            if not (short.any() or self.searching.numpy()[0]):
+            if not ((short & mine).any() or self.searching.numpy()[0]):
                 break
+        others = self.members[~mine]  # are as their last forces left them
+        for name, kept in before.items():
+            found = state[name].numpy().copy()
+            found[others] = kept[others]
+            state[name].assign(found)
         self.pairs.renew(state, list(worlds))
 
     def start(self) -> None:

@@ -4,83 +4,11 @@ import functools
 
 import numpy as np
 import pytest
-import warp as wp
 
 import particlesim as ps
+from cases.gas import BOX, SIGMA, check, cloud, simulate
 from cases.worlds import equal_alone
 from particlesim.engine.model import Model
-
-ETA, GAMMA = 1.2, 5 / 3
-VISCOSITY = ps.ArtificialViscosity(1.0, 2.0)
-SIGMA = 21 / (16 * np.pi)
-BOX = ((-2.0, -2.0, -2.0), (2.0, 2.0, 2.0))
-
-
-def cloud(count, seed=1, periodic=None, viscosity=VISCOSITY, state=None, group=None, **options):
-    """Gas that is some hundred times as dense in the middle as outside, and quick."""
-    random = np.random.default_rng(seed)
-    x = random.normal(0, 0.7, (count, 3))
-    if periodic is not None:
-        x = random.uniform(-2, 2, (count, 3)) * np.where(np.arange(count) % 2, 1, 0.3)[:, None]
-    scene = ps.Scene(periodic=periodic)
-    scene.add_particles(
-        x, mass=random.uniform(0.5, 1.5, count) / count, velocity=random.normal(0, 0.5, (count, 3)),
-        internal_energy=random.uniform(0.5, 1.5, count),
-    )  # fmt: skip
-    scene.add_interaction(
-        ps.SPH(group, smoothing_length=ps.AdaptiveSmoothing(ETA, **options),
-               equation_of_state=state or ps.IdealGas(GAMMA), viscosity=viscosity)
-    )  # fmt: skip
-    return scene
-
-
-def simulate(scene, device="cpu", integrator="velocity_verlet", **knobs):
-    settings = ps.Settings(
-        **{"dt": 0.02, "substeps": 4, "precision": "float64", "integrator": integrator, **knobs}
-    )
-    return ps.Simulation(scene, settings, device=device)
-
-
-def reference(scene, sim):
-    """Of all pairs, at the present state: eta, densities, accelerations and heating."""
-    m, h = scene.mass, sim.state.smoothing_length.numpy().astype(float)
-    x, v, u = (sim.get(name).astype(float) for name in ("position", "velocity", "internal_energy"))
-    x_ij, v_ij = x[:, None] - x, v[:, None] - v
-    if scene.periodic:
-        x_ij -= 4.0 * np.round(x_ij / 4.0)
-    r = np.linalg.norm(x_ij, axis=-1)
-    q = r / h[:, None]
-    s = np.maximum(1 - q / 2, 0)
-    w, slope = s**4 * (1 + 2 * q), -5 * s**3
-    sums = (m * w).sum(axis=1)
-    rho = SIGMA / h**3 * sums
-    omega = -(m * q * q * slope).sum(axis=1) / (3 * sums)
-    omega[sim.interactions[0].lengths.at_bound()] = 1.0  # lengths that do not follow
-    c, approach = np.sqrt(GAMMA * (GAMMA - 1) * u), (v_ij * x_ij).sum(axis=-1)
-    mean = lambda a: (a[:, None] + a) / 2  # noqa: E731
-    mu = mean(h) * np.minimum(approach, 0) / (r**2 + 0.01 * mean(h) ** 2)
-    viscous = (2 * mu - mean(c)) * mu / mean(rho)
-    stress = (GAMMA - 1) * u / (omega * rho)
-    g = SIGMA / h[:, None] ** 5 * slope
-    pull = (stress[:, None] + viscous / 2) * g
-    a = -((m * (pull + pull.T))[:, :, None] * x_ij).sum(axis=1)
-    heat = (m * (stress[:, None] * g + viscous / 4 * (g + g.T)) * approach).sum(axis=1)
-    return (h**3 * rho / m) ** (1 / 3), rho, a, heat
-
-
-def check(scene, sim):
-    """Sums of the simulation, whose forces were taken at its present state, and all pairs'."""
-    precision = sim.model.precision.name
-    eta, rho, a, heat = reference(scene, sim)
-    # ln h is found to the tolerance in a Newton step, and twice that where Omega is far off 1.
-    tolerance, eps = {"float32": 1e-5, "float64": 1e-9}[precision], np.finfo(precision).eps
-    free = ~sim.interactions[0].lengths.at_bound()
-    assert free.mean() > 0.98
-    np.testing.assert_allclose(eta[free], ETA, rtol=10 * tolerance + 100 * eps)
-    np.testing.assert_allclose(sim.get("density"), rho, rtol=100 * eps)
-    size = np.abs(a).max()
-    np.testing.assert_allclose(sim.get("force") / scene.mass[:, None], a, atol=60 * 16 * eps * size)
-    return heat
 
 
 @pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
@@ -209,6 +137,14 @@ def test_bits_of_every_way(integrator, precision, tmp_path):
     for sim in (together, loaded):
         sim.run(4)
     assert np.array_equal(together.position, loaded.position)
+    other = together.world(1).position
+    for sim in (together, loaded):
+        if sim is together:
+            # What is written in one world is nothing to another.
+            sim.world(0).position = 0.9 * sim.world(0).position
+        sim.run(2)
+    assert np.array_equal(together.world(1).position, loaded.world(1).position)
+    assert not np.array_equal(together.world(1).position, other)
     found = []
     for execution, threads in [("graph", 1), ("threads", 1), ("threads", 2)]:
         sim = run(cloud(3000), execution=execution, threads=threads)
@@ -228,154 +164,3 @@ def test_interpolates_with_the_length_of_each():
     found = sim.interpolate(fluid, at, "density")
     np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-14)
     assert found[2] == 0
-
-
-def test_positions_that_are_written_have_lengths_that_fit():
-    scene = cloud(300)
-    sim = simulate(scene)
-    before = sim.get("smoothing_length")
-    sim.position = 2 * sim.position
-    # To the tolerance of both.
-    np.testing.assert_allclose(sim.get("smoothing_length"), 2 * before, rtol=1e-7)
-
-
-def test_lengths_end_at_the_largest_and_a_run_says_so():
-    """Particles by themselves keep it, and what they feel of each other derives from it."""
-    scene = cloud(300, largest=0.5)
-    sim = simulate(scene)
-    h = sim.get("smoothing_length")
-    assert 0.05 < (h == 0.5).mean() < 0.9 and h.max() == 0.5
-    with pytest.warns(ps.StabilityWarning, match="largest must be above"):
-        sim.run(1)
-    before = sim.diagnostics()
-    sim.run(5)
-    assert sim.diagnostics().energy == pytest.approx(before.energy, rel=1e-12)
-
-
-def test_refuses(refused):
-    for options in ({"eta": 0.0}, {"eta": np.nan}, {"largest": -1.0}, {"largest": np.inf}):
-        (name,) = options
-        with refused(name):
-            ps.AdaptiveSmoothing(**options)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("count", [0, 1, 2, 5])
-@pytest.mark.parametrize("dimension", [1, 2, 3])
-def test_few_particles(count, dimension):
-    x = np.random.default_rng(0).uniform(0, 1, (5, 3))[:count] * (np.arange(3) < dimension)
-    scene = ps.Scene()
-    scene.add_particles(x, internal_energy=1.0)
-    scene.add_interaction(
-        ps.SPH(smoothing_length=ps.AdaptiveSmoothing(), equation_of_state=ps.IdealGas(1.4),
-               dimension=dimension)
-    )  # fmt: skip
-    sim = simulate(scene)
-    sim.run(2)
-    assert np.isfinite(sim.position).all() and np.isfinite(sim.get("density")).all()
-
-
-@pytest.mark.slow
-def test_coincident_particles_part():
-    x = np.repeat(np.random.default_rng(0).uniform(0, 1, (40, 3)), 2, axis=0)
-    scene = ps.Scene()
-    scene.add_particles(x, mass=1 / 80, internal_energy=1.0)
-    scene.add_interaction(
-        ps.SPH(smoothing_length=ps.AdaptiveSmoothing(), equation_of_state=ps.IdealGas(1.4))
-    )
-    sim = simulate(scene, watchdog=False)
-    before = sim.diagnostics()
-    sim.run(5)
-    apart = np.linalg.norm(sim.position[::2] - sim.position[1::2], axis=1)
-    assert (apart > 1e-5).all()  # from 0; what is near each other hardly feels it
-    assert sim.diagnostics().energy == pytest.approx(before.energy, rel=1e-12)
-    assert np.abs(sim.diagnostics().momentum).max() < 1e-12
-
-
-@pytest.mark.slow
-def test_two_gases_have_lengths_of_their_own():
-    """As each alone, where they do not meet; from the start on, and from a start again."""
-    scenes = [cloud(300), cloud(200, seed=3)]
-    both = ps.Scene()
-    groups = []
-    for k, scene in enumerate(scenes):
-        groups.append(
-            both.add_particles(
-                scene.position, mass=scene.mass, velocity=scene.velocity, group=f"gas {k}",
-                internal_energy=scene.column("internal_energy"),
-            )
-        )  # fmt: skip
-    for group, eta in zip(groups, (1.2, 1.5), strict=True):
-        both.add_interaction(
-            ps.SPH(group, smoothing_length=ps.AdaptiveSmoothing(eta), viscosity=VISCOSITY,
-                   equation_of_state=ps.IdealGas(GAMMA))
-        )  # fmt: skip
-    sim = simulate(both)
-    alone = simulate(scenes[0])
-    for each in (sim, alone):
-        each.run(4)
-    assert np.array_equal(sim.position[:300], alone.position)
-    end = sim.position
-    sim.reset()
-    sim.run(4)
-    assert np.array_equal(sim.position, end)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("precision", ["float32", "float64"])
-@pytest.mark.parametrize("unit", [1e-6, 1e6])
-def test_units_do_not_matter(unit, precision):
-    """Lengths in other units, and with them velocities and energies; from rest, as where velocities
-    are random, particles that meet multiply what rounding differs by.
-    """
-    found = []
-    for scale in (1.0, unit):
-        plain = cloud(300)
-        scene = ps.Scene()
-        scene.add_particles(scale * plain.position, mass=plain.mass, internal_energy=scale**2)
-        scene.add_interaction(plain.interactions[0])
-        sim = simulate(scene, precision=precision)
-        sim.run(2)
-        found.append((sim.position / scale, sim.get("smoothing_length") / scale))
-    # As both may be found to the tolerance, and moves are a few lengths in 8 substeps.
-    rtol = {"float32": 1e-3, "float64": 1e-7}[precision]
-    for ours, theirs in zip(*found, strict=True):
-        np.testing.assert_allclose(ours, theirs, rtol=rtol, atol=rtol)
-
-
-@pytest.mark.slow
-def test_laws_of_ones_own_name_the_internal_energy():
-    """A stiffened gas, P = (gamma - 1) rho u - gamma P0, whose u is heated as any."""
-
-    @ps.law
-    def pressure(density: float, internal_energy: float, gamma: float, stiffness: float):
-        return (gamma - 1.0) * density * internal_energy - gamma * stiffness
-
-    @ps.law
-    def energy(internal_energy: float):
-        return internal_energy
-
-    @ps.law
-    def sound_speed(density: float, pressure: float, gamma: float, stiffness: float):
-        return wp.sqrt(gamma * (pressure + stiffness) / density)
-
-    class StiffenedGas(ps.EquationOfState):
-        def __init__(self, gamma, stiffness):
-            self.parameters = {"gamma": gamma, "stiffness": stiffness}
-
-    StiffenedGas.pressure, StiffenedGas.energy = pressure, energy
-    StiffenedGas.sound_speed = sound_speed
-    sim = simulate(cloud(200, state=StiffenedGas(1.4, 1e-6)))
-    before = sim.diagnostics().energy
-    rho, u = sim.get("density"), sim.get("internal_energy")
-    np.testing.assert_allclose(sim.get("pressure"), 0.4 * rho * u - 1.4e-6, rtol=1e-12)
-    sim.run(3)
-    assert sim.diagnostics().energy == pytest.approx(before, rel=1e-12)
-
-
-@pytest.mark.slow
-def test_a_surface_is_drawn():
-    pytest.importorskip("pysplashsurf")
-    sim = simulate(cloud(300))
-    points, _triangles, _normals = ps.Surface(sim).mesh()
-    assert len(points) > 10
