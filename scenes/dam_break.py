@@ -25,6 +25,7 @@ def build(
     spacing: float = 0.025,
     tank: float = 2.5,
     viscosity: float = 0.05,
+    seed: int = 0,
 ) -> ps.Scene:
     """Water in the left of a tank.
 
@@ -34,12 +35,16 @@ def build(
         spacing: Of the particles [m].
         tank: Length of the tank [m].
         viscosity: Artificial viscosity, alpha.
+        seed: Of how the water stirs at first, by a thousandth of the fastest speed.
     """
     height = 2 * width
     fastest = np.sqrt(2 * GRAVITY * height)
     scene = ps.Scene()
     column = ps.sample.box((0, 0, 0), (width, height, depth), spacing)
-    water = scene.add_particles(column, mass=1000.0 * spacing**3, radius=spacing / 2, group="water")
+    stir = np.random.default_rng(seed).normal(0.0, 1e-3 * fastest, column.shape)
+    water = scene.add_particles(
+        column, velocity=stir, mass=1000.0 * spacing**3, radius=spacing / 2, group="water"
+    )
     scene.add_interaction(ps.UniformGravity((0, -GRAVITY, 0)))
     scene.add_interaction(
         ps.SPH(

@@ -43,3 +43,45 @@ def test_tank_at_rest():
     # as the last rows, which nothing presses on, have fallen into each other.
     assert abs(2 * y.mean() - 1) < 0.01
     assert np.linalg.norm(sim.velocity, axis=1).max() < 0.01 * np.sqrt(g)
+
+
+@pytest.mark.parametrize("across", [10, pytest.param(20, marks=pytest.mark.slow)])
+def test_tank_at_rest_in_a_box(across):
+    """What a box and a fluid do by themselves: it stands, as high as it was, and its weight is felt.
+
+    Ten seconds, with nothing set by hand but the viscosity that quiets the sound of the start.
+    """
+    spacing, g = 1 / across, 9.81
+    scene = ps.Scene()
+    x = ps.sample.box((0, 0, 0), (0.5, 1, 0.5), spacing)
+    scene.add_particles(x, mass=1000 * spacing**3, radius=spacing / 2)
+    scene.add_interaction(ps.UniformGravity((0, -g, 0)))
+    c = 10 * np.sqrt(2 * g)
+    fluid = scene.add_interaction(
+        ps.SPH(smoothing_length=1.3 * spacing, rest_density=1000.0, equation_of_state=ps.Tait(c),
+               viscosity=ps.ArtificialViscosity(0.3))
+    )  # fmt: skip
+    tank = scene.add_constraint(ps.BoxBoundary((0, 0, 0), (0.5, 2, 0.5)))
+    sim = ps.Simulation(scene, ps.Settings(dt=1 / 30, substeps=10 * across // 5), device="cpu")
+    sim.run(30)
+    early = sim.diagnostics().kinetic[0]
+    sim.run(240)
+    depths = np.linspace(0.1, 0.8, 15)
+    middle = np.column_stack([np.full(15, 0.25), 1 - depths, np.full(15, 0.25)])
+    floor = np.array(
+        [(a, 0, b) for a in np.linspace(0.1, 0.4, 7) for b in np.linspace(0.1, 0.4, 7)]
+    )
+    force, weight, pressed = [], [], []
+    for _ in range(31):  # over the periods of the sound that is left, 4 H / c = 0.09 s
+        sim.step()
+        force.append(sim.force(tank))
+        p = sim.interpolate(fluid, middle, "pressure", normalized=True)
+        weight.append(np.polyfit(depths, p, 1)[0])
+        pressed.append(sim.interpolate(fluid, floor, "pressure", normalized=True).mean())
+    y = sim.position[:, 1]
+    assert abs(2 * y.mean() - 1) < 0.01
+    assert sim.diagnostics().kinetic[0] < 0.5 * early
+    assert np.mean(force, axis=0) == pytest.approx([0, -1000 * g / 4, 0], abs=0.02 * 250 * g)
+    if across >= 20:  # what is interpolated over four spacings is too coarse at ten
+        assert np.mean(weight) == pytest.approx(1000 * g, rel=0.02)
+        assert np.mean(pressed) == pytest.approx(1000 * g, rel=0.02)

@@ -50,7 +50,7 @@ def near_type(precision: Precision, total: int) -> Any:
     fields = {
         "distance": wp.array(dtype=each),
         "rate": wp.array(dtype=each),  # at which it grows; empty where nobody asks
-        "against": wp.array(dtype=precision.vec3),  # velocity to a wall that holds on; or empty
+        "against": wp.array(dtype=precision.vec3),  # velocity to the nearest that holds; or empty
         "normal": wp.array(dtype=normals_of(precision, total)),
         "near": wp.array(dtype=wp.int32),
     }
@@ -156,6 +156,7 @@ def distance_kernel(surface: Surface) -> wp.Kernel:
                 k = place_of[a]
                 away = d[a] + real(slack[w * stride + begin + a])
                 if away < own[k]:
+                    nearest = away < wp.min(own)
                     own[k] = wp.max(away, real(0.0))
                     n = vec3(N[a, 0], N[a, 1], N[a, 2])
                     for c in range(3):
@@ -166,7 +167,8 @@ def distance_kernel(surface: Surface) -> wp.Kernel:
                             u = u - velocity(x[i], pose[w])
                         rate[k] = wp.dot(u, n)
                         if wp.static(sticky):
-                            o.against[i] = u
+                            if nearest:
+                                o.against[i] = u
             o.distance[i] = own
             o.normal[i] = n_own
             if rated:
