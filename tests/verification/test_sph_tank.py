@@ -47,7 +47,7 @@ def test_tank_at_rest():
 
 @pytest.mark.parametrize("across", [10, pytest.param(20, marks=pytest.mark.slow)])
 def test_tank_at_rest_in_a_box(across):
-    """What a box and a fluid do by themselves: it stands, as high as it was, and its weight is felt.
+    """What a box and a fluid do by themselves: it stands as high as it was, and weighs as much.
 
     Ten seconds, with nothing set by hand but the viscosity that quiets the sound of the start.
     """

@@ -16,11 +16,10 @@ ones (Morris et al. 1997), against the wall: s = -1 for an odd number of such re
     (v_i - s v_j) . x_ij
         + 2 sum_slip (d_ia' d_ja + s d_ia d_ja') + 2 sum_stick d_ja (d_ia' - s d_ja')
 
-Clusters of slots that no wall is near to go by the plain terms.
+Clusters of slots that no wall is near to go by the plain terms, those near one by its images.
 """
 
 import functools
-import itertools
 from typing import Any
 
 import warp as wp
@@ -29,68 +28,54 @@ from ...engine.loops import Pairs, Periodicity, Term, box_type, reader
 from ...engine.packed import FLAGS
 from ...precision import Precision, function, function_from_source, register
 from ..pair import sums_over_partners
+from .seen import Seen
 from .walls import near_type
 
-Sticky = tuple[bool, ...] | None
 
-
-def sets(total: int) -> list[tuple[int, ...]]:
-    """Every set of places of walls that makes an image."""
-    sizes = range(1, total + 1)
-    return [each for size in sizes for each in itertools.combinations(range(total), size)]
-
-
-def _squares(total: int) -> list[str]:
+def _squares(seen: Seen) -> list[str]:
     """Source of 4 d_i d_j by place."""
-    return [f"e{a} = real(4.0) * D_i[{a}] * D_j[{a}]" for a in range(total)]
+    return [f"e{a} = real(4.0) * D_i[{a}] * D_j[{a}]" for a in range(seen.places)]
 
 
-def _weights(total: int) -> list[str]:
+def _weights(seen: Seen) -> list[str]:
     """Source that adds w(q') of all images to ``found``."""
-    squares = [" + ".join(f"e{a}" for a in each) for each in sets(total)]
+    squares = [" + ".join(f"e{a}" for a in each) for each in seen.sets]
     added = [f"found += weight(wp.sqrt(r2 + {square}) * p.inverse_h)" for square in squares]
-    return [*_squares(total), *added]
+    return [*_squares(seen), *added]
 
 
 def density_term(
-    weight: wp.Function, total: int, precision: Precision, data: Any, params: Any
+    weight: wp.Function, seen: Seen, precision: Precision, data: Any, params: Any
 ) -> Term:
     """Term m_j (w(q) + sum w(q')), the density without the normalisation of W."""
-    lines = [
-        "D_i = read(d.wall, i)",
-        "D_j = read(d.wall, j)",
-        "found = weight(wp.sqrt(r2) * p.inverse_h)",
-        *_weights(total),
-    ]
+    lines = [*seen.read("D=wall"), "found = weight(wp.sqrt(r2) * p.inverse_h)", *_weights(seen)]
     names = {"weight": weight, "mass": reader(precision)}
     sums = "mass(d.m, j) * found"
-    return _term("add_images", lines, sums, 1, total, names, precision, data, params)
+    return _term("add_images", lines, sums, 1, seen, names, precision, data, params)
 
 
 @functools.cache
 def own_weight(
-    weight: wp.Function, total: int, precision: Precision, data: Any, params: Any
+    weight: wp.Function, seen: Seen, precision: Precision, data: Any, params: Any
 ) -> wp.Function:
     """``own(i, d, p)``: w(0), and w(q') of the images that a particle has of itself."""
-    lines = ["D_i = d.wall[i]", "D_j = D_i", "r2 = real(0.0)", "found = weight(r2)"]
-    lines += _weights(total)
+    lines = ["j = i", *seen.read("D=wall"), "r2 = real(0.0)", "found = weight(r2)"]
+    lines += _weights(seen)
     header, names = "own(i: int, d: Data, p: Params)", {"weight": weight}
-    return _function(header, lines, "found", total, names, precision, data, params)
+    return _function(header, lines, "found", seen, names, precision, data, params)
 
 
 def force_term(
-    pull: wp.Function, dragged: wp.Function | None, total: int,
-    direction: tuple[float, float, float], sticky: Sticky, precision: Precision, data: Any,
-    params: Any,
+    pull: wp.Function, dragged: wp.Function | None, seen: Seen,
+    direction: tuple[float, float, float], precision: Precision, data: Any, params: Any,
 ) -> Term:  # fmt: skip
     """Term (sum of w x_ij; of 2 d_ja w by place) over a pair and its images.
 
     Args:
         pull: w(i, j, approach, r2, d, p) of one pair (see :mod:`.sph`).
         dragged: The same of what is along v_ij' instead, without the approach; or None.
-        total: Places of walls.
+        seen: The walls.
         direction: Of coincident particles.
-        sticky: By place, whether the fluid sticks there; None: the approach does not count.
         precision: Of the simulation.
         data: Struct with ``wall`` and, where the approach counts, ``v`` and ``rate``, and where it
             sticks ``against``, velocities against walls.
@@ -100,70 +85,63 @@ def force_term(
         "apart = r2 > p.closest_squared",
         "side = wp.where(d.slot[i] < d.slot[j], -p.smoothing_length, p.smoothing_length)",
         "distance2 = wp.where(apart, r2, p.smoothing_length * p.smoothing_length)",
-        *_pair(sticky),
+        *_pair(seen),
         "g = pull(i, j, approach, distance2, d, p)",
         "aside = direction * wp.where(apart, real(0.0), side * g)",
-        *_pulls(total, sticky, "j", "real(2.0) * D_j[{a}]", ["g += g{n}"]),
+        *_pulls(seen, "j", "real(2.0) * D_j[{a}]", ["g += g{n}"]),
         "f = x_ij * g + aside",
     ]
     if dragged is not None:
-        lines += ["f = f + dragged(i, j, r2, d, p) * parting", *_drags(total, sticky, "j")]
-    sums = ", ".join([*(f"f[{c}]" for c in range(3)), *(f"b{a}" for a in range(total))])
+        lines += ["f = f + dragged(i, j, r2, d, p) * parting", *_drags(seen, "j")]
+    sums = ", ".join([*(f"f[{c}]" for c in range(3)), *(f"b{a}" for a in range(seen.places))])
     names = {"pull": pull, "dragged": dragged, "direction": precision.vec3(*direction)}
-    return _term("push_images", lines, sums, 3 + total, total, names, precision, data, params)
+    width = 3 + seen.places
+    return _term("push_images", lines, sums, width, seen, names, precision, data, params)
 
 
-def press_term(
-    pull: wp.Function, total: int, sticky: Sticky, precision: Precision, data: Any, params: Any
-) -> Term:
+def press_term(pull: wp.Function, seen: Seen, precision: Precision, data: Any, params: Any) -> Term:
     """Term of (d_ia + d_ja) w by place: what the images of a pair have along a wall's normal."""
-    lines = [*_pair(sticky), *_pulls(total, sticky, "j", "(D_i[{a}] + D_j[{a}])", [])]
-    sums = ", ".join(f"b{a}" for a in range(total))
-    return _term("press", lines, sums, total, total, {"pull": pull}, precision, data, params)
+    lines = [*_pair(seen), *_pulls(seen, "j", "(D_i[{a}] + D_j[{a}])", [])]
+    sums, names = ", ".join(f"b{a}" for a in range(seen.total)), {"pull": pull}
+    return _term("press", lines, sums, seen.total, seen, names, precision, data, params)
 
 
 @functools.cache
 def own_push(
-    pull: wp.Function, dragged: wp.Function | None, total: int, sticky: Sticky,
-    precision: Precision, data: Any, params: Any,
+    pull: wp.Function, dragged: wp.Function | None, seen: Seen, precision: Precision, data: Any,
+    params: Any,
 ) -> wp.Function:  # fmt: skip
     """``own(i, d, p)``: the term of forces over the images of a particle of itself."""
-    lines = ["D_i = d.wall[i]", "D_j = D_i", "r2 = real(0.0)", "approach = real(0.0)"]
-    if sticky is not None:
-        lines += ["R_i = d.rate[i]", "R_j = R_i", "meeting = approach", "parting = vec3()"]
-    if sticky is not None and any(sticky):
-        lines += ["both = real(2.0) * d.against[i]"]
-    lines += [*_pulls(total, sticky, "i", "real(2.0) * D_i[{a}]", []), "f = vec3()"]
+    lines = ["j = i", "x_ij = vec3()", "r2 = real(0.0)", *_pair(seen)]
+    lines += [*_pulls(seen, "i", "real(2.0) * D_i[{a}]", []), "f = vec3()"]
     if dragged is not None:
-        lines += _drags(total, sticky, "i")
-    numbers = [*(f"f[{c}]" for c in range(3)), *(f"b{a}" for a in range(total))]
+        lines += _drags(seen, "i")
+    numbers = [*(f"f[{c}]" for c in range(3)), *(f"b{a}" for a in range(seen.places))]
     result = f"sums({', '.join(numbers)})"
-    names = {"pull": pull, "dragged": dragged, "sums": precision.vector(3 + total)}
+    names = {"pull": pull, "dragged": dragged, "sums": precision.vector(3 + seen.places)}
     header = "own(i: int, d: Data, p: Params)"
-    return _function(header, lines, result, total, names, precision, data, params)
+    return _function(header, lines, result, seen, names, precision, data, params)
 
 
-def _pair(sticky: Sticky) -> list[str]:
+def _pair(seen: Seen) -> list[str]:
     """Source of how far walls are from both particles, and of how fast these approach."""
-    lines = ["D_i = read(d.wall, i)", "D_j = read(d.wall, j)"]
-    if sticky is None:
-        return [*lines, "approach = real(0.0)"]
-    lines += ["R_i = read(d.rate, i)", "R_j = read(d.rate, j)"]
+    if seen.sticky is None:
+        return [*seen.read("D=wall"), "approach = real(0.0)"]
+    lines = seen.read("D=wall", "R=rate")
     lines += ["parting = velocity(d.v, i) - velocity(d.v, j)", "approach = wp.dot(parting, x_ij)"]
-    if any(sticky):
+    if any(seen.sticky):
         lines += ["both = velocity(d.against, i) + velocity(d.against, j)"]
         lines += ["meeting = wp.dot(both, x_ij)"]
     return lines
 
 
-def _drags(total: int, sticky: Sticky, j: str) -> list[str]:
+def _drags(seen: Seen, j: str) -> list[str]:
     """Source that adds what drags along v_ij' of every image: to f, and to b where it is mirrored.
 
     v_ij' is v_i - s v_j, and 2 s d_ja' n_a more for every wall along which the fluid slips.
     """
-    assert sticky is not None
-    lines = []
-    for n, each in enumerate(sets(total)):
+    sticky, lines = seen.sticky or (), list[str]()
+    for n, each in enumerate(seen.sets):
         square = "".join(f" + e{a}" for a in each)
         odd = sum(sticky[a] for a in each) % 2 == 1
         sign = "-real(2.0)" if odd else "real(2.0)"
@@ -185,12 +163,11 @@ def _approach(each: tuple[int, ...], sticky: tuple[bool, ...]) -> str:
     return " + ".join(terms)
 
 
-def _pulls(total: int, sticky: Sticky, j: str, arm: str, also: list[str]) -> list[str]:
+def _pulls(seen: Seen, j: str, arm: str, also: list[str]) -> list[str]:
     """Source of w of every image, which b of each of its places takes up along an ``arm``."""
-    places = range(total)
-    lines = [*_squares(total), *(f"b{a} = real(0.0)" for a in places)]
-    for n, each in enumerate(sets(total)):
-        closing = "approach" if sticky is None else _approach(each, sticky)
+    lines = [*_squares(seen), *(f"b{a} = real(0.0)" for a in range(seen.places))]
+    for n, each in enumerate(seen.sets):
+        closing = "approach" if seen.sticky is None else _approach(each, seen.sticky)
         square = "".join(f" + e{a}" for a in each)
         lines.append(f"g{n} = pull(i, {j}, {closing}, r2{square}, d, p)")
         lines += [line.format(n=n) for line in also]
@@ -199,23 +176,23 @@ def _pulls(total: int, sticky: Sticky, j: str, arm: str, also: list[str]) -> lis
 
 
 def _term(
-    name: str, lines: list[str], sums: str, width: int, total: int, names: dict[str, Any],
+    name: str, lines: list[str], sums: str, width: int, seen: Seen, names: dict[str, Any],
     precision: Precision, data: Any, params: Any,
 ) -> Term:  # fmt: skip
     header = f"{name}(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: Params)"
     names = {**names, "sums": precision.vector(width)}
-    made = _function(header, lines, f"sums({sums})", total, names, precision, data, params)
+    made = _function(header, lines, f"sums({sums})", seen, names, precision, data, params)
     return Term(made, width, rounding="fused")
 
 
 def _function(
-    header: str, lines: list[str], result: str, total: int, names: dict[str, Any],
+    header: str, lines: list[str], result: str, seen: Seen, names: dict[str, Any],
     precision: Precision, data: Any, params: Any,
 ) -> wp.Function:  # fmt: skip
     source = "\n    ".join([f"def {header}:", *lines, f"return {result}"]) + "\n"
     known = {
         "wp": wp, "real": precision.scalar, "vec3": precision.vec3, "Data": data, "Params": params,
-        "read": reader(precision, total), "velocity": reader(precision, 3),
+        "read": seen.reader(precision), "velocity": reader(precision, 3),
     }  # fmt: skip
     return function_from_source(source, {**known, **names})
 
@@ -241,38 +218,45 @@ def keep_press(
 
 @functools.cache
 def add_force(
-    own: wp.Function, total: int, precision: Precision, data: Any, params: Any, out: Any
+    own: wp.Function, seen: Seen, precision: Precision, data: Any, params: Any, out: Any
 ) -> wp.Function:
     """Store: f += m_i (sum + normals of the walls times theirs); ``own`` is of :func:`own_push`."""
-    vec3, sums = precision.vec3, precision.vector(3 + total)
+    places, alone = seen.places, seen.alone
+    vec3, sums = precision.vec3, precision.vector(3 + places)
 
     def add_walled_force(i: int, particle: int, found: sums, d: data, p: params, o: out):
         a = vec3(found[0], found[1], found[2])
         b = own(i, d, p)
         a = a + vec3(b[0], b[1], b[2])
         N = o.normal[i]
-        for k in range(wp.static(total)):
-            a = a + vec3(N[k, 0], N[k, 1], N[k, 2]) * (found[3 + k] + b[3 + k])
+        for k in range(wp.static(places)):
+            row = k
+            if wp.static(alone):
+                row = d.alone[i]
+            a = a + vec3(N[row, 0], N[row, 1], N[row, 2]) * (found[3 + k] + b[3 + k])
         o.f[particle] = o.f[particle] + d.m[i] * a
 
     return function(add_walled_force)
 
 
+# A term, its store, and the structs of data and outputs.
+Way = tuple[Term, wp.Function, Any, Any]
+
+
 @functools.cache
 def walled_kernel(
-    plain: tuple[Term, wp.Function, Any, Any], walled: tuple[Term, wp.Function, Any, Any],
-    params: Any, precision: Precision, periodic: Periodicity, partners: str, vectorised: bool,
-    total: int,
+    plain: Way, alone: Way, several: Way, params: Any, precision: Precision, periodic: Periodicity,
+    partners: str, vectorised: bool, total: int,
 ) -> wp.Kernel:  # fmt: skip
-    """Kernel: sum over partners by one term where no wall is near, and by another where one is.
-
-    Both are (term, store, struct of data, struct of outputs), as of ``pair_kernel``.
-    """
+    """Kernel: sums over partners, each cluster by a way for none, one or several walls near it."""
     Box, Near = box_type(precision), near_type(precision, total)
     where = precision, periodic, partners, vectorised
-    sums = sums_over_partners(plain[0], plain[1], plain[2], params, plain[3], *where)
-    near_sums = sums_over_partners(walled[0], walled[1], walled[2], params, walled[3], *where)
-    Data, Out, NearData, NearOut = plain[2], plain[3], walled[2], walled[3]
+    ways = [
+        sums_over_partners(term, store, data, params, out, *where)
+        for term, store, data, out in (plain, alone, several)
+    ]
+    sums, sums_of_one, sums_of_several = ways
+    Data, Out, NearData, NearOut = plain[2], plain[3], several[2], several[3]
     flags = FLAGS["fused"] if vectorised else ""
 
     @functools.partial(register, cpu_only=vectorised, flags=flags)
@@ -289,9 +273,12 @@ def walled_kernel(
     ):
         c = first + wp.tid()
         w = pairs.world[pairs.lead[c]]
-        if near.near[c] != 0:
-            near_sums(c, pairs, box[w], near_d, parameters[w], near_o)
-        else:
+        many = near.near[c]
+        if many == 0:
             sums(c, pairs, box[w], d, parameters[w], o)
+        elif many == 1:
+            sums_of_one(c, pairs, box[w], near_d, parameters[w], near_o)
+        else:
+            sums_of_several(c, pairs, box[w], near_d, parameters[w], near_o)
 
     return sum_beside_walls

@@ -52,7 +52,8 @@ def near_type(precision: Precision, total: int) -> Any:
         "rate": wp.array(dtype=each),  # at which it grows; empty where nobody asks
         "against": wp.array(dtype=precision.vec3),  # velocity to the nearest that holds; or empty
         "normal": wp.array(dtype=normals_of(precision, total)),
-        "near": wp.array(dtype=wp.int32),
+        "near": wp.array(dtype=wp.int32),  # cluster -> how many places, 2 for more
+        "alone": wp.array(dtype=wp.int32),  # slot -> which, where it is one
     }
     return structure(f"Near{total}_{precision.name}", fields)
 
@@ -178,8 +179,11 @@ def distance_kernel(surface: Surface) -> wp.Kernel:
 
 
 @functools.cache
-def near_kernel(precision: Precision, total: int, fluid: Any) -> wp.Kernel:
-    """Kernel: which clusters have a slot from which a wall is nearer than the reach."""
+def near_kernel(precision: Precision, total: int, alike: bool, fluid: Any) -> wp.Kernel:
+    """Kernel: how many places have a wall that is nearer to a cluster than the reach.
+
+    Unless they are ``alike`` one counts as several.
+    """
     Near = near_type(precision, total)
 
     @register
@@ -188,10 +192,20 @@ def near_kernel(precision: Precision, total: int, fluid: Any) -> wp.Kernel:
         begin = pairs.lead[c]
         reach = wp.sqrt(fluids[pairs.world[begin]].cutoff_squared)
         found = int(0)
+        which = int(0)
+        for a in range(wp.static(total)):
+            near = int(0)
+            for i in range(begin, pairs.lead[c + 1]):
+                if o.distance[i][a] < reach:
+                    near = 1
+            if near == 1:
+                found += 1
+                which = a
+        if wp.static(not alike):
+            found *= 2
         for i in range(begin, pairs.lead[c + 1]):
-            if wp.min(o.distance[i]) < reach:
-                found = 1
-        o.near[c] = found
+            o.alone[i] = which
+        o.near[c] = wp.min(found, 2)
 
     return mark_near
 

@@ -96,6 +96,8 @@ class Walls:
         self.sticky = tuple(k in holds for k in range(self.total)) if moving else None
         self.normal = pairs.array(kernels.normals_of(precision, self.total))
         self.struct.normal = self.normal
+        self.alone = pairs.array(wp.int32)
+        self.struct.alone = self.alone
         self.struct.near = wp.zeros(pairs.rows, dtype=wp.int32, device=model.device)
         # Of every side in every world how far it gives way to the start.
         sides = [len(wall.places) for wall in self.walls]
@@ -120,20 +122,24 @@ class Walls:
         return np.repeat(every, self.stride) if name == "slack" else None
 
     def _make_terms(self, fields: Mapping[str, wp.array]) -> None:
-        model, fluid, total = self.model, self.fluid, self.total
-        beside = {**fields, "wall": self.distance}
+        model, fluid = self.model, self.fluid
+        beside = {**fields, "wall": self.distance, "alone": self.alone}
         if self.rate is not None:
             beside["rate"] = self.rate
         if len(self.against):
             beside["against"] = self.against
         given = model, fluid.pairs, "FluidBesideWalls", beside, fluid.Params, fluid.params
         self.loop = PairLoop.over(*given)
-        own = model.precision, self.loop.Data, self.loop.Params
-        self.density_term = images.density_term(fluid.weight, total, *own)
-        self.own_weight = images.own_weight(fluid.weight, total, *own)
-        pairs, direction = (fluid.pull(*own), fluid.dragged(*own)), DIRECTIONS[fluid.dimension]
-        self.force_term = images.force_term(*pairs, total, direction, self.sticky, *own)
-        self.own_push = images.own_push(*pairs, total, self.sticky, *own)
+        self.types = types = model.precision, self.loop.Data, self.loop.Params
+        self.pulls, direction = fluid.pull(*types), DIRECTIONS[fluid.dimension]
+        pair = self.pulls, fluid.dragged(*types)
+        self.seen = images.Seen(self.total, self.sticky)
+        one = None if self.sticky is None else self.sticky[:1]
+        self.ways = [images.Seen(self.total, one, alone=True), self.seen]
+        self.density_terms = [images.density_term(fluid.weight, each, *types) for each in self.ways]
+        self.own_weights = [images.own_weight(fluid.weight, each, *types) for each in self.ways]
+        self.force_terms = [images.force_term(*pair, each, direction, *types) for each in self.ways]
+        self.own_pushes = [images.own_push(*pair, each, *types) for each in self.ways]
 
     def look(self) -> None:
         """Find how far the walls are from where particles are now."""
@@ -161,7 +167,8 @@ class Walls:
         for begin, (surface, inputs) in zip(self.begins, seen, strict=True):
             own = [*inputs, v, begin, self.stride, slack, self.struct]
             launch(kernels.distance_kernel(surface), pairs.count, own, device)
-        near = kernels.near_kernel(precision, self.total, fluid.Params)
+        alike = self.sticky is None or len(set(self.sticky)) == 1
+        near = kernels.near_kernel(precision, self.total, alike, fluid.Params)
         launch(near, pairs.rows, [pairs.pairs, fluid.params, self.struct], device)
 
     def sum_density(self, plain: Pass, laws: tuple[Any, ...]) -> None:
@@ -170,17 +177,23 @@ class Walls:
             plain.loop.sum(*plain[1:])
             return
         self.look()
-        store = functools.partial(keep_state, self.own_weight, *laws)
-        self._sum(plain, Pass(self.loop, self.density_term, store, plain.out))
+        beside = [
+            Pass(self.loop, term, functools.partial(keep_state, own, *laws), plain.out)
+            for term, own in zip(self.density_terms, self.own_weights, strict=True)
+        ]
+        self._sum(plain, *beside)
 
     def sum_force(self, plain: Pass) -> None:
         """The pass of forces, of which ``plain`` is that far from walls."""
         if not self:
             plain.loop.sum(*plain[1:])
             return
-        store = functools.partial(images.add_force, self.own_push, self.total)
         out = {**plain.out, "normal": self.normal}
-        self._sum(plain, Pass(self.loop, self.force_term, store, out))
+        beside = [
+            Pass(self.loop, term, functools.partial(images.add_force, own, seen), out)
+            for term, own, seen in zip(self.force_terms, self.own_pushes, self.ways, strict=True)
+        ]
+        self._sum(plain, *beside)
 
     def pressed(self, part: Part) -> np.ndarray | None:
         """What the fluid exerts on a boundary, (worlds, 3), at the last densities; None: nothing.
@@ -190,11 +203,10 @@ class Walls:
         for (own, _), places in zip(self.held, self.places, strict=True):
             if own.peers != part.peers:
                 continue
-            fluid, pairs = self.fluid, self.fluid.pairs
-            types = self.model.precision, self.loop.Data, self.loop.Params
-            term = images.press_term(fluid.pull(*types), self.total, self.sticky, *types)
+            pairs, own = self.fluid.pairs, self.own_pushes[-1]
+            term = images.press_term(self.pulls, self.seen, *self.types)
             store = functools.partial(
-                images.keep_press, self.own_push, min(places), max(places) + 1, self.total
+                images.keep_press, own, min(places), max(places) + 1, self.total
             )
             pressed = pairs.array(self.model.precision.vec3)
             self.loop.sum(term, store, {"pressed": pressed, "normal": self.normal})
@@ -203,9 +215,9 @@ class Walls:
             return -np.stack([force[begin:end].sum(axis=0) for begin, end in edges])
         return None
 
-    def _sum(self, plain: Pass, beside: Pass) -> None:
+    def _sum(self, plain: Pass, *beside: Pass) -> None:
         model, pairs, made = self.model, self.fluid.pairs, []
-        for loop, term, store, out in (plain, beside):
+        for loop, term, store, out in (plain, *beside):
             Out = structure_of("PairSums", out)
             own = store(model.precision, loop.Data, loop.Params, Out)
             made.append((term, own, loop.Data, Out))
@@ -213,9 +225,9 @@ class Walls:
             *made, self.fluid.Params, model.precision, model.periodic, pairs.partners,
             model.vectorised, self.total,
         )  # fmt: skip
-        written = [filled(made[0][3], plain.out), filled(made[1][3], beside.out)]
+        written = [filled(made[k][3], each.out) for k, each in ((0, plain), (-1, beside[-1]))]
         inputs = [pairs.pairs, model.box, self.fluid.params, plain.loop.data, written[0]]
-        pairs.sum(kernel, [*inputs, self.struct, beside.loop.data, written[1]])
+        pairs.sum(kernel, [*inputs, self.struct, beside[-1].loop.data, written[1]])
 
 
 def _held(model: Model, fluid: Any, part: ConstraintBase) -> np.ndarray:
