@@ -83,13 +83,17 @@ def test_density_error_is_that_of_the_fluid():
     values = sample(sim)
     # rho_i = sum_j m W(r_ij, h), by brute force with Wendland's C2 of 3D:
     # W = 21 / (16 pi h^3) (1 - q/2)^4 (2 q + 1), q = r / h < 2.
+    # The floor at 0.02 gives way to drops at 0.05 by the 0.02 that they lack to half their spacing:
+    # it is a mirror at 0.
     x = sim.position[:64]
-    q = np.linalg.norm(x[:, None] - x, axis=2) / 0.2
+    both = np.concatenate([x, x * [1, -1, 1]])
+    q = np.linalg.norm(x[:, None] - both, axis=2) / 0.2
     weight = 21 / (16 * np.pi * 0.2**3) * np.maximum(1 - q / 2, 0) ** 4 * (2 * q + 1)
     error = weight.sum(axis=1) / 1000 - 1
-    np.testing.assert_allclose(values["density_error_max:SPH"], error.max(), rtol=1e-12)
+    # By how much it gives way is kept in single precision: 0.02 2^-24 of h, at a slope of order 1.
+    np.testing.assert_allclose(values["density_error_max:SPH"], error.max(), rtol=1e-7)
     rms = np.sqrt(np.mean(error**2))
-    np.testing.assert_allclose(values["density_error_rms:SPH"], rms, rtol=1e-12)
+    np.testing.assert_allclose(values["density_error_rms:SPH"], rms, rtol=1e-7)
 
 
 def test_residuals_are_those_of_the_geometry():
