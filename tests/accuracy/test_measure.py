@@ -107,6 +107,7 @@ def test_frames_too_few_for_a_period_are_refused(refused):
         measure(over="period", frames=60, error=1e-7, settings=ps.Settings(dt=0.15))
 
 
+@pytest.mark.slow
 def test_average_over_time_leaves_the_start_out():
     settings = ps.Settings(dt=0.25, integrator=VERLET)
 

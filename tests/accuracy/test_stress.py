@@ -14,6 +14,7 @@ def swing():
     return scene
 
 
+@pytest.mark.slow
 def test_settings_that_the_scene_chooses():
     seen = []
     table = ps.stress(

@@ -205,6 +205,7 @@ def test_references(reference):
     assert table.bound == pytest.approx(8.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_reference_of_options():
     def attract(reach=1.0):
         scene = ps.Scene()

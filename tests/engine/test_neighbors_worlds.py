@@ -103,7 +103,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize("backwards", [True, pytest.param(False, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("case", CASES)
 def test_a_world_goes_as_it_goes_alone(case, backwards, precision, device):
     """Bit for bit, whatever the other worlds' cutoffs, in either order."""

@@ -24,8 +24,14 @@ def truth(name):
     return motion(PARTS[name], PLAIN, "float64")
 
 
+BETWEEN = {"electron", "colloid", "star"}  # neither the smallest nor the largest
+
+
 @pytest.mark.parametrize("precision", CLOSE)
-@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize(
+    "units",
+    [pytest.param(k, marks=[pytest.mark.slow] * (k in BETWEEN)) for k in UNITS],
+)
 @pytest.mark.parametrize("name", PARTS)
 def test_a_scene_in_other_units(name, units, precision):
     part, unit = PARTS[name], UNITS[units]

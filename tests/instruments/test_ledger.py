@@ -7,7 +7,8 @@ import pytest
 
 import particlesim as ps
 from cases.ledger import EPS, G, assert_closed, busy, stepped, stone
-from particlesim.commands.scene_files import load_scene, ready_scenes
+from cases.ready import swept
+from particlesim.commands.scene_files import load_scene
 
 SMALL = {
     "dam_break": {"spacing": 0.05},
@@ -148,7 +149,7 @@ def test_a_bounce_takes_its_share(restitution, device):
 # Balances -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", list(ready_scenes()))
+@pytest.mark.parametrize("name", swept())
 def test_every_ready_scene_closes(name, device):
     module = load_scene(name)
     scene = module.build(**SMALL.get(name, {}))

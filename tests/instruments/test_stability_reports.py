@@ -9,8 +9,8 @@ import pytest
 import warp as wp
 
 import particlesim as ps
+from cases.ready import swept
 from cases.stability import chain, grains, oscillator, simulation
-from particlesim.commands.scene_files import ready_scenes
 from particlesim.instruments.stability import StabilityWarning
 
 SMALL = {
@@ -174,7 +174,7 @@ def test_tradeoff_of_dt_auto():
 # The ready scenes
 
 
-@pytest.mark.parametrize("name", list(ready_scenes()))
+@pytest.mark.parametrize("name", swept())
 def test_ready_scenes_are_within_their_limits(name):
     module = importlib.import_module(f"particlesim.scenes.{name}")
     sim = ps.Simulation(module.build(**SMALL.get(name, {})), module.settings, device="cpu")

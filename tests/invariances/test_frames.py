@@ -71,7 +71,9 @@ def test_in_motion(name):
 
 @pytest.mark.parametrize("name", kinds())
 @pytest.mark.parametrize("unit", ["length", "mass", "time"])
-@pytest.mark.parametrize("power", [-30, -3, 3, 30])
+@pytest.mark.parametrize(
+    "power", [-30, 30, *(pytest.param(k, marks=pytest.mark.slow) for k in (-3, 3))]
+)
 def test_other_units(name, unit, power):
     assert_same([name], Frame(**{unit: 10.0**power}), ROUNDING)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from particlesim.commands.scene_files import ready_scenes
+from cases.ready import swept
 
 SMALL = {
     "dam_break": {"spacing": 0.06},
@@ -46,7 +46,7 @@ def assert_equal(one, other):
     np.testing.assert_array_equal(one.get("velocity"), other.get("velocity"))
 
 
-@pytest.mark.parametrize("name", ready_scenes())
+@pytest.mark.parametrize("name", swept())
 def test_worlds_of_a_batch_and_threads(name):
     scene, settings = described(name)
     alone = run(scene, settings.replace(execution="graph", threads=1))
@@ -55,7 +55,7 @@ def test_worlds_of_a_batch_and_threads(name):
         assert_equal(batch.world(w), alone)
 
 
-@pytest.mark.parametrize("name", ready_scenes())
+@pytest.mark.parametrize("name", swept())
 def test_looking_changes_nothing(name, tmp_path):
     scene, settings = described(name)
 
@@ -71,7 +71,7 @@ def test_looking_changes_nothing(name, tmp_path):
     assert_equal(run(scene, settings, look), run(scene, settings))
 
 
-@pytest.mark.parametrize("name", ready_scenes())
+@pytest.mark.parametrize("name", swept())
 def test_order_of_forces(name):
     """The same sums in another order: round-off, and what chaos makes of it in three frames."""
     scene, settings = described(name)

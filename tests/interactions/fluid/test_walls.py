@@ -53,7 +53,9 @@ def simulation(scene, precision="float64", device="cpu", **knobs):
     return ps.Simulation(scene, settings, device=device)
 
 
-@pytest.mark.parametrize("kind", BOUNDARIES)
+@pytest.mark.parametrize(
+    "kind", ["box", "law", *(pytest.param(k, marks=pytest.mark.slow) for k in ("planes", "sphere"))]
+)
 def test_forces_are_minus_the_gradient_of_the_energy(kind):
     """Beside flat walls and curved ones, in corners and in the middle."""
     scene = water(BOUNDARIES[kind](), shift=0.075)  # so that no wall gives way
@@ -158,6 +160,7 @@ def test_what_starts_in_a_wall_comes_out_of_it_gently():
     assert np.sort(sim.position[:, 2])[:100].mean() > 0.0115
 
 
+@pytest.mark.slow
 def test_a_piston_does_work_on_a_gas():
     """P V^gamma along an adiabat: what the piston spends is what the gas has gained."""
     count, gamma = 24, 5 / 3

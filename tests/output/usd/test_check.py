@@ -7,7 +7,8 @@ import pytest
 from pxr import Gf, Sdf, Vt
 
 import particlesim as ps
-from particlesim.commands.scene_files import load_scene, ready_scenes
+from cases.ready import swept
+from particlesim.commands.scene_files import load_scene
 from particlesim.output.usd.checking.check import check
 from particlesim.output.usd.checking.fault import Fault
 from particlesim.output.usd.info import info
@@ -272,7 +273,7 @@ def test_a_range_that_leaves_frames_out(copy):
     is_one(spoilt(copy / "out.usda", plant), "range", "/", "timeCodes", None)
 
 
-@pytest.mark.parametrize("name", ready_scenes())
+@pytest.mark.parametrize("name", swept())
 def test_ready_scenes_have_no_faults(name, tmp_path):
     module = load_scene(name)
     sim = ps.Simulation(module.build(**SMALL.get(name, {})), module.settings, device="cpu")
