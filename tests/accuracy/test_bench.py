@@ -114,7 +114,7 @@ def test_every_case_says_what_it_is():
 
 
 ALIKE = {"cloth_10", "grains_200k", "lennard_jones_256k"}  # others' work, in other numbers
-LONG = {"cloth", "cost", "grains", "lennard_jones", "memory", "gravity"}
+LONG = {"cloth", "cost", "grains", "gravity", "gravity_tree", "lennard_jones", "memory", "wcsph"}
 
 
 @pytest.mark.parametrize(

@@ -58,6 +58,7 @@ def _gas():
     return case.build, case.observe
 
 
+@pytest.mark.slow
 def test_chaos_of_one_start_is_refused(refused):
     def three():
         scene = ps.Scene()

@@ -260,6 +260,7 @@ def test_a_reference_that_diverges():
         )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_momentum_drift():
     # 10 * 0.4 of momentum, sqrt(2 K) = 4 of it: all of it comes from outside.
     table = sweep(error="momentum")

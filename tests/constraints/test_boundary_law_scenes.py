@@ -72,7 +72,8 @@ def stirred(k, scene_of):
 # Worlds, restarts, execution ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", ["float64", "float32"])
 def test_a_world_in_a_batch_equals_it_alone(precision, device, simulate, scene_of):
     """Bit for bit, with parameters of its own."""
     knobs = {"dt": 1 / 60, "substeps": 4, "precision": precision}

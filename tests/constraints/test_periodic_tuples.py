@@ -58,7 +58,9 @@ def test_a_long_tuple_is_in_one_piece(chain, brought_in, precision, device):
     np.testing.assert_allclose(found[1][1], found[0][1], rtol=0, atol=2 * tolerance)
 
 
-@pytest.mark.parametrize("chain", CHAINS)
+@pytest.mark.parametrize(
+    "chain", [CHAINS[0], *(pytest.param(each, marks=pytest.mark.slow) for each in CHAINS[1:])]
+)
 def test_a_long_tuple_is_projected_in_one_piece(chain, precision, simulate):
     """Its ends, more than half a box apart, come 1 nearer to each other along their line."""
     x = np.array(chain, dtype=float)

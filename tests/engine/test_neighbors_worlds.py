@@ -102,9 +102,14 @@ CASES = {
 }
 
 
+ALIKE = {"groups", "the first wider than the second", "two cutoffs, large worlds"}
+
+
 @pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("backwards", [True, pytest.param(False, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [pytest.param(k, marks=[pytest.mark.slow] * (k in ALIKE)) for k in CASES]
+)
 def test_a_world_goes_as_it_goes_alone(case, backwards, precision, device):
     """Bit for bit, whatever the other worlds' cutoffs, in either order."""
     build, worlds = CASES[case]

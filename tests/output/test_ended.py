@@ -51,6 +51,7 @@ def start(*words):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_terminated_run_is_trimmed_and_goes_on(scene, tmp_path):
     terminate_at_random(scene, tmp_path, 3)
 

@@ -54,6 +54,7 @@ def executed(tmp_path, monkeypatch):
     return execute
 
 
+@pytest.mark.slow
 def test_a_notebook_with_a_run_tables_pictures_and_a_plot(executed):
     run, *others, plot = executed(RUN, *TABLES, *PICTURES, PLOT)
     (bar,) = run  # one line, however often it was drawn

@@ -7,6 +7,7 @@ import numpy as np
 
 from particlesim.commands.scene_files import ready_scenes
 
+from ..ready import LONG
 from .judge import Row, whole
 
 SMALL = {
@@ -49,5 +50,5 @@ def rows():
                 sane,
                 FRAMES.get(name, 40),
                 settings,
-                slow=bool(knobs),
+                slow=bool(knobs) or name in LONG,
             )
