@@ -28,7 +28,7 @@ from ...engine.loops import Pairs, Periodicity, Term, box_type, reader
 from ...engine.packed import FLAGS
 from ...precision import Precision, function, function_from_source, register
 from ..pair import sums_over_partners
-from .seen import Seen
+from .seen import Seen, nearest_function
 from .walls import near_type
 
 
@@ -192,7 +192,8 @@ def _function(
     source = "\n    ".join([f"def {header}:", *lines, f"return {result}"]) + "\n"
     known = {
         "wp": wp, "real": precision.scalar, "vec3": precision.vec3, "Data": data, "Params": params,
-        "read": seen.reader(precision), "velocity": reader(precision, 3),
+        "read": reader(precision, seen.total), "velocity": reader(precision, 3),
+        "one": precision.vector(1), "nearest": nearest_function(precision, seen.total),
     }  # fmt: skip
     return function_from_source(source, {**known, **names})
 
@@ -221,19 +222,22 @@ def add_force(
     own: wp.Function, seen: Seen, precision: Precision, data: Any, params: Any, out: Any
 ) -> wp.Function:
     """Store: f += m_i (sum + normals of the walls times theirs); ``own`` is of :func:`own_push`."""
-    places, alone = seen.places, seen.alone
-    vec3, sums = precision.vec3, precision.vector(3 + places)
+    total, alone = seen.total, seen.alone
+    vec3, sums = precision.vec3, precision.vector(3 + seen.places)
+    nearest = nearest_function(precision, total)
 
     def add_walled_force(i: int, particle: int, found: sums, d: data, p: params, o: out):
         a = vec3(found[0], found[1], found[2])
         b = own(i, d, p)
         a = a + vec3(b[0], b[1], b[2])
         N = o.normal[i]
-        for k in range(wp.static(places)):
-            row = k
+        M = nearest(d.wall[i])
+        for k in range(wp.static(total)):
+            n = vec3(N[k, 0], N[k, 1], N[k, 2])
             if wp.static(alone):
-                row = d.alone[i]
-            a = a + vec3(N[row, 0], N[row, 1], N[row, 2]) * (found[3 + k] + b[3 + k])
+                a = a + n * (M[k] * (found[3] + b[3]))
+            else:
+                a = a + n * (found[3 + k] + b[3 + k])
         o.f[particle] = o.f[particle] + d.m[i] * a
 
     return function(add_walled_force)

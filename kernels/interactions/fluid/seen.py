@@ -6,9 +6,7 @@ from typing import NamedTuple
 
 import warp as wp
 
-from ...engine.loops import reader
-from ...precision import Precision, native
-from ...warp_internals import elements, vector
+from ...precision import Precision, function
 
 
 class Seen(NamedTuple):
@@ -17,7 +15,7 @@ class Seen(NamedTuple):
     Args:
         total: Places of walls in the arrays.
         sticky: By place, whether the fluid sticks there; None: the approach does not count.
-        alone: Only one of them is near, that in ``alone`` of the slot; all are alike.
+        alone: Only one of them is near; all are alike.
     """
 
     total: int
@@ -36,26 +34,27 @@ class Seen(NamedTuple):
         return [each for size in sizes for each in itertools.combinations(range(self.places), size)]
 
     def read(self, *names: str) -> list[str]:
-        """Source that reads such an array of both particles of a pair."""
-        k = ", k" if self.alone else ""
-        lines = [f"{n[0]}_{i} = read(d.{n[2:]}, {i}{k})" for n in names for i in "ij"]
-        return ["k = d.alone[i]", *lines] if self.alone else lines
+        """Source that reads such an array of both particles of a pair.
 
-    def reader(self, precision: Precision) -> wp.Function:
-        """What that reads by."""
-        return one_reader(precision, self.total) if self.alone else reader(precision, self.total)
+        Of one that is alone by its scalar product with what is 1 in its place and else 0, which the
+        vector units take as it is. It is the nearest to a particle that has any within reach.
+        """
+        if not self.alone:
+            return [f"{n[0]}_{i} = read(d.{n[2:]}, {i})" for n in names for i in "ij"]
+        lines = [f"{n[0]}_{i} = one(wp.dot(read(d.{n[2:]}, {i}), M))" for n in names for i in "ij"]
+        return ["M = nearest(read(d.wall, i))", *lines]
 
 
 @functools.cache
-def one_reader(precision: Precision, width: int) -> wp.Function:
-    """``read(array, j, k)``: of vectors from an array without gaps the component k, as a vector."""
-    kind, real = precision.vector(width), precision.c
-    snippet = f"""
-    const {real}* data = {elements("array", real)};
-    return {vector(1, real)}(data[{width} * (long long)j + k]);
-"""
-    one = precision.vector(1)
+def nearest_function(precision: Precision, total: int) -> wp.Function:
+    """``nearest(D)``: 1 where D is least, else 0."""
+    each, real = precision.vector(total), precision.scalar
 
-    def read(array: wp.array(dtype=kind), j: int, k: int) -> one: ...
+    def nearest(D: each):
+        M = each()
+        least = wp.min(D)
+        for a in range(wp.static(total)):
+            M[a] = wp.where(D[a] <= least, real(1.0), real(0.0))
+        return M
 
-    return native(read, snippet, after_gradients=False)
+    return function(nearest)

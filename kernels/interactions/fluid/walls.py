@@ -53,7 +53,6 @@ def near_type(precision: Precision, total: int) -> Any:
         "against": wp.array(dtype=precision.vec3),  # velocity to the nearest that holds; or empty
         "normal": wp.array(dtype=normals_of(precision, total)),
         "near": wp.array(dtype=wp.int32),  # cluster -> how many places, 2 for more
-        "alone": wp.array(dtype=wp.int32),  # slot -> which, where it is one
     }
     return structure(f"Near{total}_{precision.name}", fields)
 
@@ -192,19 +191,14 @@ def near_kernel(precision: Precision, total: int, alike: bool, fluid: Any) -> wp
         begin = pairs.lead[c]
         reach = wp.sqrt(fluids[pairs.world[begin]].cutoff_squared)
         found = int(0)
-        which = int(0)
         for a in range(wp.static(total)):
             near = int(0)
             for i in range(begin, pairs.lead[c + 1]):
                 if o.distance[i][a] < reach:
                     near = 1
-            if near == 1:
-                found += 1
-                which = a
+            found += near
         if wp.static(not alike):
             found *= 2
-        for i in range(begin, pairs.lead[c + 1]):
-            o.alone[i] = which
         o.near[c] = wp.min(found, 2)
 
     return mark_near

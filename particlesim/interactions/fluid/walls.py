@@ -96,8 +96,6 @@ class Walls:
         self.sticky = tuple(k in holds for k in range(self.total)) if moving else None
         self.normal = pairs.array(kernels.normals_of(precision, self.total))
         self.struct.normal = self.normal
-        self.alone = pairs.array(wp.int32)
-        self.struct.alone = self.alone
         self.struct.near = wp.zeros(pairs.rows, dtype=wp.int32, device=model.device)
         # Of every side in every world how far it gives way to the start.
         sides = [len(wall.places) for wall in self.walls]
@@ -123,7 +121,7 @@ class Walls:
 
     def _make_terms(self, fields: Mapping[str, wp.array]) -> None:
         model, fluid = self.model, self.fluid
-        beside = {**fields, "wall": self.distance, "alone": self.alone}
+        beside = {**fields, "wall": self.distance}
         if self.rate is not None:
             beside["rate"] = self.rate
         if len(self.against):
