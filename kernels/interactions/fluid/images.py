@@ -130,7 +130,7 @@ def _pair(seen: Seen) -> list[str]:
     lines = seen.read("D=wall", "R=rate")
     lines += ["parting = velocity(d.v, i) - velocity(d.v, j)", "approach = wp.dot(parting, x_ij)"]
     if any(seen.sticky):
-        lines += ["both = velocity(d.against, i) + velocity(d.against, j)"]
+        lines += [f"both = velocity(d.{seen.against}, i) + velocity(d.{seen.against}, j)"]
         lines += ["meeting = wp.dot(both, x_ij)"]
     return lines
 

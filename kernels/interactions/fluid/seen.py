@@ -16,11 +16,13 @@ class Seen(NamedTuple):
         total: Places of walls in the arrays.
         sticky: By place, whether the fluid sticks there; None: the approach does not count.
         alone: Only one of them is near; all are alike.
+        against: The array of velocities against walls to which the fluid sticks.
     """
 
     total: int
     sticky: tuple[bool, ...] | None
     alone: bool = False
+    against: str = "v"
 
     @property
     def places(self) -> int:

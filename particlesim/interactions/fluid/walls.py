@@ -89,7 +89,8 @@ class Walls:
         self.struct.distance = self.distance
         self.struct.rate = none if self.rate is None else self.rate
         sticks = [wall.sticky and moving for wall in self.walls]
-        vec3, count = precision.vec3, pairs.count if any(sticks) else 0
+        carried = any(on and len(wall.pose) for on, wall in zip(sticks, self.walls, strict=True))
+        vec3, count = precision.vec3, pairs.count if carried else 0
         self.against = pairs.array(vec3) if count else wp.empty(0, dtype=vec3, device=model.device)
         self.struct.against = self.against
         holds = {k for on, places in zip(sticks, self.places, strict=True) if on for k in places}
@@ -131,9 +132,10 @@ class Walls:
         self.types = types = model.precision, self.loop.Data, self.loop.Params
         self.pulls, direction = fluid.pull(*types), DIRECTIONS[fluid.dimension]
         pair = self.pulls, fluid.dragged(*types)
-        self.seen = images.Seen(self.total, self.sticky)
+        against = "against" if len(self.against) else "v"
+        self.seen = images.Seen(self.total, self.sticky, against=against)
         one = None if self.sticky is None else self.sticky[:1]
-        self.ways = [images.Seen(self.total, one, alone=True), self.seen]
+        self.ways = [images.Seen(self.total, one, True, against), self.seen]
         self.density_terms = [images.density_term(fluid.weight, each, *types) for each in self.ways]
         self.own_weights = [images.own_weight(fluid.weight, each, *types) for each in self.ways]
         self.force_terms = [images.force_term(*pair, each, direction, *types) for each in self.ways]
