@@ -167,6 +167,7 @@ def gas(seed=0, count=30):
     return scene
 
 
+@pytest.mark.slow
 def test_averages_of_a_chaotic_scene_are_held_against_chance():
     settings = ps.Settings(dt=0.05, integrator="velocity_verlet", precision="float64")
     table = ps.tradeoff(

@@ -59,6 +59,7 @@ def test_programs_print_nothing_of_warp(said, code):
     assert said(code) == ""
 
 
+@pytest.mark.slow
 def test_a_first_run_prints_nothing_of_what_it_compiles(said, tmp_path):
     assert said(DRAW, WARP_CACHE_PATH=str(tmp_path / "cache")) == ""
 

@@ -73,6 +73,7 @@ except ps.SimulationError as error:
 """
 
 
+@pytest.mark.slow
 def test_fast_mathematics_still_conserves_and_still_names_what_is_wrong(tmp_path):
     # Built so that the compiler may assume that nothing is NaN: the watchdog must find it all the
     # same. In a process of its own, as kernels are made once a process.
