@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -72,15 +72,7 @@ class Holding(EasedConstraint):
         """What it is to a continuum."""
         name, precision = type(self).__name__, model.precision
         Params, params = model.parameters(f"{name}Wall", self._columns(["friction"]))
-        moving = any(peer.moves for peer in self.peers)
-        count = model.world_count if moving else 0
-        pose = wp.zeros(count, dtype=pose_type(precision), device=model.device)
-        motion = self._motion(model) if moving else None
-
-        def follow() -> None:
-            if moving:
-                launch(pose_kernel(precision), count, [motion, state.time, pose], model.device)
-
+        pose, follow = self._posed(model, state)
         facing = self.facing(precision, Params)
         own = self.name, self.peers, self.places, not self.slip
         return Wall(*own, facing, Params, params, pose, follow)
@@ -97,8 +89,7 @@ class Holding(EasedConstraint):
         self.held.pressed = wp.zeros(self.count, dtype=precision.vec3, device=device)
         if self.rough:
             self.held.grip = wp.zeros(self.count, dtype=each, device=device)
-        if self.moving:
-            self._attach_motion(state)
+        self.held.pose, self.follow = self._posed(model, state)
         forces = "force" in state
         self.force = state.force if forces else wp.empty(0, dtype=precision.vec3, device=device)
         self.form = kernels.Form(
@@ -109,17 +100,13 @@ class Holding(EasedConstraint):
         self.project_kernel = kernels.project_kernel(self.form)
         self.bounce_kernel = kernels.bounce_kernel(self.form, forces)
 
-    def _attach_motion(self, state: State) -> None:
-        """The motions, and room for where they have led."""
-        model = self.model
-        self.motion = self._motion(model)
-        self.clock = state.time
-        self.held.pose = wp.zeros(
-            model.world_count, dtype=pose_type(model.precision), device=model.device
-        )
-
-    def _motion(self, model: Model) -> wp.array:
-        """How it moves in every world."""
+    def _posed(self, model: Model, state: State) -> tuple[wp.array, Callable[[], None]]:
+        """Where it is, one a world, and what brings that to the present; empty where it stays."""
+        moving = any(peer.moves for peer in self.peers)
+        count, precision = model.world_count if moving else 0, model.precision
+        pose = wp.zeros(count, dtype=pose_type(precision), device=model.device)
+        if not moving:
+            return pose, lambda: None
         carried = [peer._carried() for peer in self.peers]
         columns = {
             "velocity": [peer.velocity for peer in self.peers],
@@ -128,9 +115,11 @@ class Holding(EasedConstraint):
             "turn": [turn for _, turn in carried],
             "pivot": [peer._pivot() for peer in self.peers],
         }
-        return model.structures(
+        motion = model.structures(
             motion_type(), {name: np.array(rows) for name, rows in columns.items()}
         )
+        inputs = [motion, state.time, pose]
+        return pose, lambda: launch(pose_kernel(precision), count, inputs, model.device)
 
     def complaint(self) -> str:
         """That places are too coarse for the radii."""
@@ -146,11 +135,8 @@ class Holding(EasedConstraint):
     def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if not self.count or dt <= 0:
             return
-        if self.moving:
-            # The clock goes with the positions: this is where the substep ends.
-            model = self.model
-            inputs = [self.motion, self.clock, self.held.pose]
-            launch(pose_kernel(model.precision), model.world_count, inputs, model.device)
+        # The clock goes with the positions: this is where the substep ends.
+        self.follow()
         # A static projection goes by the radii as they are, and leaves the marks to the first step.
         if dt < math.inf:
             self._launch(self.begin_kernel, self.easing.struct, dt)

@@ -13,7 +13,6 @@ from ..constraints.constraint import Constraint
 from ..constraints.contact import Contact
 from ..engine.execution.launch import launch
 from ..engine.source import Source
-from ..kernels.constraints.rigid_motion import pose_kernel
 from ..kernels.instruments import residual as kernels
 
 UNMET = 0.02  # of a tuple's extent: what it may be off by
@@ -65,10 +64,7 @@ def _of_tuples(constraint: Constraint, sim: Source) -> tuple[np.ndarray, np.ndar
 def _of_boundary(constraint: Boundary, sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
     if not constraint.count:
         return None
-    model = sim.model
-    if constraint.moving:
-        inputs = [constraint.motion, constraint.clock, constraint.held.pose]
-        launch(pose_kernel(model.precision), model.world_count, inputs, model.device)
+    constraint.follow()
     kernel = kernels.boundary_kernel(constraint.form)
     inputs = [constraint.params, constraint.held, constraint.bodies]
     return _run(kernel, constraint.count, inputs, sim), constraint.held.world.numpy()

@@ -232,21 +232,3 @@ def heat_term(
         return rate
 
     return Term(function(warm), kicks)
-
-
-@functools.cache
-def keep_measure(
-    energy: wp.Function, hot: bool, precision: Precision, data: Any, params: Any, out: Any
-) -> wp.Function:
-    """Store: the particle's energy m u and its share of the virial."""
-    real, one = precision.scalar, precision.vector(1)
-
-    def keep(i: int, particle: int, total: one, d: data, p: params, o: out):
-        u = real(0.0)
-        if wp.static(hot):
-            u = d.u[i]
-        u = energy(d.state[i][1], u, real(1.0) / d.size[i][0], p)
-        o.energy[particle] = o.energy[particle] + wp.float64(d.m[i] * u)
-        o.virial[particle] = o.virial[particle] + wp.float64(total[0])
-
-    return function(keep)

@@ -91,7 +91,7 @@ class Evolving(Interaction):
         return {**kept, **self.walls.easing.persistent()} if self.walls else kept
 
     def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
-        return self.walls.worlds(name) if name == "slack" else super().worlds(name, array)
+        return self.walls.worlds if name == "slack" else super().worlds(name, array)
 
     def reset(self, worlds: Sequence[int]) -> None:
         self.forget(self.persistent(), worlds)

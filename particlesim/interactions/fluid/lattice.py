@@ -43,21 +43,21 @@ def spacings(fluid: Any, model: Model) -> np.ndarray:
 
     (m / rho_0)^(1/d) [length]; 0 where the fluid has no rest density, or no particles.
     """
-    found = np.zeros(model.world_count)
+    found, mass = np.zeros(model.world_count), model.column("mass")
     for w, peer in enumerate(fluid.peers):
         rows = fluid.pairs.members_host[fluid.pairs.begin_host[w] : fluid.pairs.end_host[w]]
         if len(rows) and "rest_density" in peer.parameters:
-            volume = model.column("mass")[rows].mean() / peer.parameters["rest_density"]
+            volume = mass[rows].mean() / peer.parameters["rest_density"]
             found[w] = volume ** (1.0 / fluid.dimension)
     return found
 
 
 def lattice_sums(fluid: Any, model: Model, h: np.ndarray) -> np.ndarray:
     """What W sums to in worlds where the fluid starts on that lattice; elsewhere 1."""
-    found = np.ones(model.world_count)
+    found, x = np.ones(model.world_count), model.column("position")
     for w, spacing in enumerate(fluid.spacings):
         rows = fluid.pairs.members_host[fluid.pairs.begin_host[w] : fluid.pairs.end_host[w]]
-        if spacing > 0 and _is_lattice(model.column("position")[rows], spacing):
+        if spacing > 0 and _is_lattice(x[rows], spacing):
             found[w] = lattice_sum(fluid.smoothing, fluid.dimension, float(h[w] / spacing))
     return found
 

@@ -66,9 +66,10 @@ class Passes(Evolving):
             self.check_range(h, columns["closest_squared"])
         self.spacings = spacings(self, model)
         if self.lengths is None:
-            columns |= {"inverse_h": 1.0 / h, "sigma": self.smoothing.sigma / h**self.dimension}
+            columns["inverse_h"] = 1.0 / most
+            columns["sigma"] = self.smoothing.sigma / most**self.dimension
             if "rest_density" in columns:
-                columns["rest_density"] = columns["rest_density"] * lattice_sums(self, model, h)
+                columns["rest_density"] = columns["rest_density"] * lattice_sums(self, model, most)
         model.fits(self.name, {name: columns[name] for name in self.parameters})
         self.Params, self.params = model.parameters("FluidParameters", columns)
 
@@ -195,6 +196,6 @@ class Passes(Evolving):
         self.look_at_density(state)
         precision, energy_law = self.model.precision, self.laws["energy"]
         term = kernels.virial_term(self.force_term, precision, self.loop.Data, self.Params)
-        keep = (kernels if self.lengths is None else of_lengths).keep_measure
-        store = functools.partial(keep, energy_law, self.hot)
+        own = self.lengths is not None
+        store = functools.partial(kernels.keep_measure, energy_law, self.hot, own)
         self.loop.sum(term, store, {"energy": energy, "virial": virial})

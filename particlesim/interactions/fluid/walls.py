@@ -17,7 +17,6 @@ from ...kernels.interactions.fluid import images
 from ...kernels.interactions.fluid import walls as kernels
 from ...kernels.interactions.fluid.sph import DIRECTIONS, keep_state
 from ...scene.constraint_base import ConstraintBase
-from ...scene.group import select
 from ...scene.part import Part
 from ..pair_loop import PairLoop
 
@@ -115,10 +114,10 @@ class Walls:
         launch(kernel, len(easing.slack), inputs, self.model.device)
         call(easing.unmark)
 
-    def worlds(self, name: str) -> np.ndarray | None:
+    @property
+    def worlds(self) -> np.ndarray:
         """The world of each row of the slack."""
-        every = np.arange(self.model.world_count)
-        return np.repeat(every, self.stride) if name == "slack" else None
+        return np.repeat(np.arange(self.model.world_count), self.stride)
 
     def _make_terms(self, fields: Mapping[str, wp.array]) -> None:
         model, fluid = self.model, self.fluid
@@ -200,8 +199,8 @@ class Walls:
 
         To each of several walls the part along its normal.
         """
-        for (own, _), places in zip(self.held, self.places, strict=True):
-            if own.peers != part.peers:
+        for (wall, _), places in zip(self.held, self.places, strict=True):
+            if wall.peers != part.peers:
                 continue
             pairs, own = self.fluid.pairs, self.own_pushes[-1]
             term = images.press_term(self.pulls, self.seen, *self.types)
@@ -232,9 +231,7 @@ class Walls:
 
 def _held(model: Model, fluid: Any, part: ConstraintBase) -> np.ndarray:
     """By particle, whether it is one of the fluid that a boundary holds, (n,) of 0 and 1."""
+    members = model.members([peer.group for peer in part.peers], part.name)
     held = np.zeros(model.particle_count, dtype=np.int32)
-    for w, (peer, scene) in enumerate(zip(part.peers, model.scenes, strict=True)):
-        held[model.offsets[w] + select(scene, peer.group, part.name)] = 1
-    own = np.zeros_like(held)
-    own[fluid.pairs.members_host] = 1
-    return held * own
+    held[np.intersect1d(members, fluid.pairs.members_host)] = 1
+    return held
