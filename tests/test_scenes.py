@@ -17,6 +17,11 @@ SMALL = {
     "star_collision": {"count": 150},
     "sod_tube": {"count": 90},
     "sedov_blast": {"side": 10},
+    "elliptical_drop": {"across": 20},
+    "polytrope": {"count": 300},
+    "standing_wave": {"spacing": 1 / 16},
+    "taylor_green": {"count": 20},
+    "toy_star": {"count": 250},
     "plummer_sphere": {"count": 300},
     "galaxy_collision": {"count": 300, "softening": 0.2},
     "freezing": {"cells": 5},
@@ -38,10 +43,10 @@ def simulate(name, frames, device, settings=None, **options):
 
 def test_the_ready_scenes_are_all_there():
     expected = (
-        "bouncing_block chain dam_break freezing galaxy_collision gas_in_a_box lj_melt "
-        "molten_salt phase_transition pile plummer_sphere polymer_melt sedov_blast sod_tube "
-        "spring_lattice "
-        "star_collision three_body triple_pendulum wave_field"
+        "bouncing_block chain dam_break elliptical_drop freezing galaxy_collision gas_in_a_box "
+        "lj_melt molten_salt phase_transition pile plummer_sphere poiseuille polymer_melt "
+        "polytrope sedov_blast sod_tube spring_lattice standing_wave star_collision taylor_green "
+        "three_body toy_star triple_pendulum wave_field"
     )
     assert set(expected.split()) <= set(NAMES)
 
