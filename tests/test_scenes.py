@@ -1,6 +1,5 @@
 """Every ready scene runs, is what it says it is, and reaches its known answer."""
 
-import importlib
 import inspect
 import subprocess
 import sys
@@ -9,33 +8,14 @@ import numpy as np
 import pytest
 
 import particlesim as ps
+from cases.ready import small
 from particlesim.commands.scene_files import ready_scenes
 
 NAMES = list(ready_scenes())
-SMALL = {
-    "dam_break": {"spacing": 0.05},
-    "star_collision": {"count": 150},
-    "sod_tube": {"count": 90},
-    "sedov_blast": {"side": 10},
-    "elliptical_drop": {"across": 20},
-    "polytrope": {"count": 300},
-    "standing_wave": {"spacing": 1 / 16},
-    "taylor_green": {"count": 20},
-    "toy_star": {"count": 250},
-    "plummer_sphere": {"count": 300},
-    "galaxy_collision": {"count": 300, "softening": 0.2},
-    "freezing": {"cells": 5},
-    "lj_melt": {"cells": 4},
-    "phase_transition": {"cells": 4},
-    "gas_in_a_box": {"count": 400},
-    "polymer_melt": {"edge": 6},
-    "molten_salt": {"edge": 4, "tolerance": 1e-4},
-}
 
 
 def simulate(name, frames, device, settings=None, **options):
-    module = importlib.import_module(f"particlesim.scenes.{name}")
-    scene = module.build(**{**SMALL.get(name, {}), **options})
+    module, scene = small(name, **options)
     sim = ps.Simulation(scene, settings or module.settings, device=device)
     sim.run(frames)
     return module, sim

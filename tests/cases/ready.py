@@ -2,15 +2,37 @@
 
 import pytest
 
-from particlesim.commands.scene_files import ready_scenes
+from particlesim.commands.scene_files import load_scene, ready_scenes
+
+# Options that make scenes small; the others are.
+SMALL = {
+    "dam_break": {"spacing": 0.05},
+    "elliptical_drop": {"across": 20},
+    "freezing": {"cells": 5},
+    "galaxy_collision": {"count": 240, "softening": 0.2},
+    "gas_in_a_box": {"count": 300},
+    "lj_melt": {"cells": 4},
+    "molten_salt": {"edge": 4, "tolerance": 1e-4},
+    "phase_transition": {"cells": 4},
+    "pile": {"count": 100},
+    "plummer_sphere": {"count": 240},
+    "polymer_melt": {"edge": 6},
+    "polytrope": {"count": 300},
+    "sedov_blast": {"side": 10},
+    "sod_tube": {"count": 90},
+    "standing_wave": {"spacing": 1 / 16},
+    "star_collision": {"count": 120},
+    "taylor_green": {"count": 20},
+    "toy_star": {"count": 250},
+}
 
 # What others stand for in every run: sod_tube for gases with heat, dam_break for SPH with walls,
 # plummer_sphere for gravity, lj_melt for liquids, pile for contacts; these themselves are swept in
 # the long one.
 LONG = {
-    "elliptical_drop", "galaxy_collision", "molten_salt", "phase_transition", "poiseuille",
-    "polymer_melt", "polytrope", "sedov_blast", "standing_wave", "star_collision", "taylor_green",
-    "toy_star",
+    "elliptical_drop", "freezing", "galaxy_collision", "molten_salt", "phase_transition",
+    "poiseuille", "polymer_melt", "polytrope", "sedov_blast", "standing_wave", "star_collision",
+    "taylor_green", "toy_star",
 }  # fmt: skip
 
 
@@ -18,3 +40,9 @@ def swept():
     """All ready scenes, as parameters of a test."""
     for name in ready_scenes():
         yield pytest.param(name, marks=[pytest.mark.slow] * (name in LONG))
+
+
+def small(name, **options):
+    """The module of a ready scene, and its scene as small as tests want it, or with options."""
+    module = load_scene(name)
+    return module, module.build(**SMALL.get(name, {}) | options)
