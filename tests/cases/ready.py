@@ -8,6 +8,7 @@ from particlesim.commands.scene_files import load_scene, ready_scenes
 SMALL = {
     "dam_break": {"spacing": 0.05},
     "elliptical_drop": {"across": 20},
+    "floating_block": {"spacing": 0.05},
     "freezing": {"cells": 5},
     "galaxy_collision": {"count": 240, "softening": 0.2},
     "gas_in_a_box": {"count": 300},
@@ -18,6 +19,7 @@ SMALL = {
     "plummer_sphere": {"count": 240},
     "polymer_melt": {"edge": 6},
     "polytrope": {"count": 300},
+    "rain_on_cloth": {"spacing": 0.05},
     "sedov_blast": {"side": 10},
     "sod_tube": {"count": 90},
     "standing_wave": {"spacing": 1 / 16},
@@ -30,9 +32,9 @@ SMALL = {
 # plummer_sphere for gravity, lj_melt for liquids, pile for contacts; these themselves are swept in
 # the long one.
 LONG = {
-    "elliptical_drop", "freezing", "galaxy_collision", "molten_salt", "phase_transition",
-    "poiseuille", "polymer_melt", "polytrope", "sedov_blast", "standing_wave", "star_collision",
-    "taylor_green", "toy_star",
+    "elliptical_drop", "floating_block", "freezing", "galaxy_collision", "molten_salt",
+    "phase_transition", "poiseuille", "polymer_melt", "polytrope", "rain_on_cloth", "sedov_blast",
+    "standing_wave", "star_collision", "taylor_green", "toy_star",
 }  # fmt: skip
 
 
