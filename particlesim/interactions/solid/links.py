@@ -22,7 +22,8 @@ class Rest:
 
     ``begin`` (n + 1,), ``other`` (m,) rows of the second; ``X`` (m, 3) from the first to the second
     [length]; ``c`` (m,) V_i V_j s with s = -W'(R) / R; ``volume`` (n,); ``inverse`` (n, 3, 3) of
-    M_i = sum_j c X X^T, 0 across the plane; ``share`` of the space that the particles fill.
+    M_i = sum_j c X X^T, 0 across the plane; ``share`` of the cells of a square
+    lattice, of the spacing that there is, which the volumes fill.
     """
 
     begin: np.ndarray
@@ -69,7 +70,9 @@ def at_rest(solid: Any, model: Model, w: int, members: np.ndarray) -> Rest:
             f"particles {_named(model, w, members, [i[k], other[k]])} in one place",
             "leave one out",
         )  # fmt: skip
-    volume = _volumes(solid, model, members, i, R)
+    nearest = np.full(len(members), np.inf)
+    np.minimum.at(nearest, i, R)
+    volume = _volumes(solid, model.column("mass")[members], nearest**d)
     s = -WendlandC2().derivative(R, h, d) / np.where(R > 0, R, 1.0)
     c = volume[i] * volume[other] * s
     M = np.zeros((len(members), 3, 3))
@@ -79,8 +82,8 @@ def at_rest(solid: Any, model: Model, w: int, members: np.ndarray) -> Rest:
     _check(solid, model, w, members, M, np.diff(begin))
     inverse = np.zeros_like(M)
     inverse[:, :d, :d] = np.linalg.inv(M[:, :d, :d])
-    filled = np.trace(M, axis1=1, axis2=2) / (d * volume) if len(members) else np.ones(1)
-    return Rest(begin, other, X, c, volume, inverse, float(np.percentile(filled, 90)))
+    share = float(np.median(volume / nearest**d)) if len(members) else 1.0
+    return Rest(begin, other, X, c, volume, inverse, share)
 
 
 def _pairs(owner: str, model: Model, w: int, x: np.ndarray, reach: float) -> np.ndarray:
@@ -97,7 +100,10 @@ def _pairs(owner: str, model: Model, w: int, x: np.ndarray, reach: float) -> np.
             shift = length[axis] * np.eye(3)[axis]
             place = np.concatenate([place, place[beyond] + shift])
             row = np.concatenate([row, row[beyond]])
-    found = np.sort(row[links(place, reach)], axis=1)
+    found = links(place, reach)
+    if len(place) == len(x):
+        return found
+    found = np.sort(row[found], axis=1)
     return np.unique(found[found[:, 0] < found[:, 1]], axis=0)
 
 
@@ -112,15 +118,11 @@ def _between(
     return (d - length * np.rint(d * inverse)).astype(np.float64)
 
 
-def _volumes(
-    solid: Any, model: Model, members: np.ndarray, i: np.ndarray, R: np.ndarray
-) -> np.ndarray:  # fmt: skip
+def _volumes(solid: Any, mass: np.ndarray, cell: np.ndarray) -> np.ndarray:
     """m / rho_0; without a rest density that of a square lattice at the spacing that they have."""
-    mass, density = model.column("mass")[members], solid.parameters["rest_density"]
+    density = solid.parameters["rest_density"]
     if density is None:
-        nearest = np.full(len(members), np.inf)
-        np.minimum.at(nearest, i, R)
-        density = np.median(mass / nearest**solid.dimension) if len(R) else 1.0
+        density = (np.median(mass / cell) if len(mass) else 0.0) or 1.0  # of nobody
     return mass / density
 
 
