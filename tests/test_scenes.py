@@ -71,7 +71,7 @@ def test_dam_break_front_follows_the_experiment(device):
 
 
 def test_rubber_rings_bounce_off_and_stay_whole(device):
-    module, sim = simulate("elastic_rings", 75, device)
+    module, sim = simulate("elastic_rings", 62, device)
     left, right = (sim.scenes[0][name].slice for name in ("left", "right"))
     x, v = sim.position, sim.velocity
     # Two surfaces that meet gain 0.1 % of their energy by twice this step (``stability``), and the

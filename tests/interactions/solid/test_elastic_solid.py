@@ -94,6 +94,22 @@ def matrices_of_plane(tensor, dimension):
     return tensor[:dimension, :dimension]
 
 
+def test_what_the_gradient_does_not_see_is_held():
+    x, moved = block(3, (6, 6, 6), jitter=0.0), 0.01 * SPACING
+    places = np.round(x / SPACING - 0.5).astype(int)
+    zigzag = moved * (1.0 - 2.0 * (places.sum(axis=1) % 2))[:, None] * [1, 0, 0]
+    energy, box = {}, (np.zeros(3), np.full(3, 6 * SPACING))
+    for alpha in (0.0, 1.0):
+        sim = simulation(body(x, periodic=box, hourglass=alpha))  # a solid without a surface
+        sim.position = x + zigzag
+        energy[alpha] = sim.diagnostics().potential[0]
+    # mu sum c |u|^2 with sum c X^2 = V in each direction and |u| = 2 a or 0 of neighbours: half of
+    # them, nearer than two spacings as a rule: above mu V (2 a)^2 3 / 2 / (2 s)^2.
+    volume = len(x) * SPACING**3
+    assert energy[1.0] > SHEAR * volume * 1.5 * (moved / SPACING) ** 2
+    assert abs(energy[0.0]) < 1e-12 * energy[1.0]
+
+
 def test_stress_answers_to_the_rate_of_strain_after_kelvin_and_voigt():
     # At rest and with v = G x the stress is tau times Hooke's of the symmetric part of G.
     x, tau = block(3), 1e-3
