@@ -123,6 +123,7 @@ class ElasticSolid(Interaction):
         }
         self.conservative = not dissipation
         self.reads_velocity = not self.conservative
+        self.requires = frozenset({"force"} | ({"velocity"} if dissipation else set()))
 
     def kind(self) -> tuple[Any, ...]:
         return (type(self), self.dimension, self.conservative)
@@ -130,40 +131,41 @@ class ElasticSolid(Interaction):
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
         self.members = model.members([peer.group for peer in self.peers], self.name)
-        self.world = model.world_of[self.members]
+        world = model.world_of[self.members]
+        self.of_world = np.split(self.members, np.searchsorted(world, range(1, model.world_count)))
         known: dict[tuple[int, int], Rest] = {}  # copies of a scene are at rest alike
-        self.rest: list[Rest] = []
-        for w, peer in enumerate(self.peers):
+        rest = []
+        for w, (peer, members) in enumerate(zip(self.peers, self.of_world, strict=True)):
             key = id(model.scenes[w]), id(peer)
             if key not in known:
-                known[key] = at_rest(peer, model, w, self.members[self.world == w])
-            self.rest.append(known[key])
-        names = ("lame", "shear", "hourglass", "dissipation")
-        columns = self.columns(dict.fromkeys(names))
+                known[key] = at_rest(peer, model, w, members)
+            rest.append(known[key])
+        self.shares = [each.share for each in rest]
+        columns = self.columns(dict.fromkeys(("lame", "shear", "hourglass", "dissipation")))
         model.fits(self.name, columns)
         self.Params, self.params = model.parameters("SolidParameters", columns)
+        self.rows = self._rows(_joined(rest), world)
+
+    def _rows(self, host: dict[str, np.ndarray], world: np.ndarray) -> Any:
+        """The struct that the kernels take."""
+        model, precision = self.model, self.model.precision
+        model.fits(self.name, {name: host[name] for name in ("link", "V", "inverse")})
+        rows = kernels.solid_type(precision)()
+        whole = {"particle": self.members, "world": world, "begin": host["begin"],
+                 "other": host["other"]}  # fmt: skip
+        for name, column in whole.items():
+            setattr(rows, name, model.array(column.astype(np.int32), wp.int32))
+        kinds = {"link": precision.vector(4), "V": precision.scalar, "inverse": precision.mat33}
+        for name, kind in kinds.items():
+            setattr(rows, name, model.array(host[name].astype(precision.numpy), kind))
+        for name in ("D", "B"):
+            setattr(rows, name, wp.zeros_like(rows.inverse))
+        return rows
 
     def attach(self, model: Model, state: State) -> None:
-        if not len(self.members):
-            return
-        host = _joined(self.rest)
-        model.fits(self.name, {name: host[name] for name in ("link", "V", "inverse")})
-        precision = model.precision
-        matrix, count = precision.mat33, len(self.members)
-        rows = kernels.solid_type(precision)()
-        for name in ("begin", "other"):
-            setattr(rows, name, model.array(host[name].astype(np.int32), wp.int32))
-        rows.particle = model.array(self.members, wp.int32)
-        rows.world = model.array(self.world.astype(np.int32), wp.int32)
-        rows.link = model.array(host["link"].astype(precision.numpy), precision.vector(4))
-        rows.V = model.array(host["V"].astype(precision.numpy), precision.scalar)
-        rows.inverse = model.array(host["inverse"].astype(precision.numpy), matrix)
-        for name in ("D", "B"):
-            setattr(rows, name, wp.zeros(count, dtype=matrix, device=model.device))
-        self.rows = rows
-        self.inputs = [self.params, model.box, rows, state.position]
+        self.inputs = [self.params, model.box, self.rows, state.position]
         self.velocity = None if self.conservative else state.velocity
-        self.variant = precision, model.periodic
+        self.variant = model.precision, model.periodic
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if len(self.members):
@@ -193,26 +195,24 @@ class ElasticSolid(Interaction):
 
     def complaint(self) -> str:
         """That places are too coarse, or that masses do not fit the rest density."""
-        for w, (peer, rest) in enumerate(zip(self.peers, self.rest, strict=True)):
-            rows, given = self.members[self.world == w], peer.parameters["rest_density"]
-            h = peer.parameters["smoothing_length"]
-            if coarse := self.model.unresolved(self.name, "smoothing_length", h, rows):
+        for peer, members, share in zip(self.peers, self.of_world, self.shares, strict=True):
+            given, h = peer.parameters["rest_density"], peer.parameters["smoothing_length"]
+            if coarse := self.model.unresolved(self.name, "smoothing_length", h, members):
                 return coarse
-            if given is not None and not SPARSE < rest.share < DENSE:
+            if given is not None and not SPARSE < share < DENSE:
                 return (
                     f"{self.name}: rest_density must be that of the particles' masses at their "
-                    f"spacing [mass/length^d], got {given:.4g}, with which they fill "
-                    f"{rest.share:.3g} of space; give about {given * rest.share:.4g}."
+                    f"spacing [mass/length^d], got {given:.4g}, with which they fill {share:.3g} "
+                    f"of space; give about {given * share:.4g}."
                 )
         return ""
 
     def fault(self, world: int) -> str:
         """Which particle's neighbourhood is turned inside out."""
-        mine = self.world == world
-        if not mine.any():
-            return ""
-        det = np.linalg.det(np.eye(3) + self.rows.D.numpy().astype(np.float64)[mine])
-        inside_out = ~(det > 0.0)
+        first = sum(map(len, self.of_world[:world]))
+        mine = slice(first, first + len(self.of_world[world]))
+        F = np.eye(3) + self.rows.D.numpy()[mine].astype(np.float64)
+        inside_out = ~(np.linalg.det(F) > 0.0)
         if not inside_out.any():
             return ""
         particle = int(self.members[mine][inside_out.argmax()] - self.model.offsets[world])
@@ -224,13 +224,13 @@ class ElasticSolid(Interaction):
 
 def _joined(rest: list[Rest]) -> dict[str, np.ndarray]:
     """The links of all worlds, with rows counted through."""
-    counts = [len(each.volume) for each in rest]
-    row = np.cumsum([0, *counts])
+    row = np.cumsum([0, *(len(each.volume) for each in rest)])
     entry = np.cumsum([0, *(len(each.c) for each in rest)])
-    begin = [each.begin[:-1] + first for each, first in zip(rest, entry, strict=False)]
+    begin = [each.begin[:-1] + first for each, first in zip(rest, entry[:-1], strict=True)]
+    other = [each.other + first for each, first in zip(rest, row[:-1], strict=True)]
     return {
         "begin": np.concatenate([*begin, entry[-1:]]),
-        "other": np.concatenate([each.other + first for each, first in zip(rest, row)]),  # noqa: B905
+        "other": np.concatenate(other),
         "link": np.concatenate([np.column_stack([each.X, each.c]) for each in rest]),
         "V": np.concatenate([each.volume for each in rest]),
         "inverse": np.concatenate([each.inverse for each in rest]),
