@@ -58,8 +58,8 @@ def at_rest(solid: Any, model: Model, w: int, members: np.ndarray) -> Rest:
             float(np.ptp(x[:, 2])), "give dimension=3, or the particles one z",
         )  # fmt: skip
     pairs = _pairs(owner, model, w, x, reach)
-    i, other = np.concatenate([pairs, pairs[:, ::-1]]).T
-    order = np.lexsort((other, i))
+    i, other = np.concatenate([pairs[:, ::-1], pairs]).T
+    order = np.argsort(i, kind="stable")  # pairs are in order, the smaller first
     i, other = i[order], other[order]
     X = _between(model, w, x, i, other)
     R = np.linalg.norm(X, axis=1)
