@@ -1,6 +1,5 @@
 """Every ready scene runs, is what it says it is, and reaches its known answer."""
 
-import importlib
 import inspect
 import subprocess
 import sys
@@ -9,29 +8,14 @@ import numpy as np
 import pytest
 
 import particlesim as ps
+from cases.ready import small
 from particlesim.commands.scene_files import ready_scenes
 
 NAMES = list(ready_scenes())
-SMALL = {
-    "dam_break": {"spacing": 0.05},
-    "star_collision": {"count": 150},
-    "sod_tube": {"count": 90},
-    "sedov_blast": {"side": 10},
-    "plummer_sphere": {"count": 300},
-    "galaxy_collision": {"count": 300, "softening": 0.2},
-    "freezing": {"cells": 5},
-    "lj_melt": {"cells": 4},
-    "phase_transition": {"cells": 4},
-    "gas_in_a_box": {"count": 400},
-    "polymer_melt": {"edge": 6},
-    "elastic_rings": {"spacing": 0.25},
-    "molten_salt": {"edge": 4, "tolerance": 1e-4},
-}
 
 
 def simulate(name, frames, device, settings=None, **options):
-    module = importlib.import_module(f"particlesim.scenes.{name}")
-    scene = module.build(**{**SMALL.get(name, {}), **options})
+    module, scene = small(name, **options)
     sim = ps.Simulation(scene, settings or module.settings, device=device)
     sim.run(frames)
     return module, sim
@@ -39,10 +23,10 @@ def simulate(name, frames, device, settings=None, **options):
 
 def test_the_ready_scenes_are_all_there():
     expected = (
-        "bouncing_block chain dam_break elastic_rings freezing galaxy_collision gas_in_a_box "
-        "lj_melt molten_salt phase_transition pile plummer_sphere polymer_melt sedov_blast "
-        "sod_tube spring_lattice "
-        "star_collision three_body triple_pendulum wave_field"
+        "bouncing_block chain dam_break elastic_rings elliptical_drop freezing galaxy_collision "
+        "gas_in_a_box lj_melt molten_salt phase_transition pile plummer_sphere poiseuille "
+        "polymer_melt polytrope sedov_blast sod_tube spring_lattice standing_wave star_collision "
+        "taylor_green three_body toy_star triple_pendulum wave_field"
     )
     assert set(expected.split()) <= set(NAMES)
 

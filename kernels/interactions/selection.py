@@ -44,12 +44,12 @@ class Selection:
             lines += ["kind_i = d.kind[i]", "kind_j = d.kind[j]"]
         for name in self.tables:
             rows = [
-                _chosen("kind_i", [f"p.{place(name, a, b)}" for a in range(self.kinds)])
+                chosen("kind_i", [f"p.{place(name, a, b)}" for a in range(self.kinds)])
                 for b in range(self.kinds)
             ]
             lines += [f"{name}_{b} = {row}" for b, row in enumerate(rows)]
             columns = [f"{name}_{b}" for b in range(self.kinds)]
-            lines.append(f"{name}_there = {_chosen('kind_j', columns)}")
+            lines.append(f"{name}_there = {chosen('kind_j', columns)}")
         conditions = []
         if WITHIN in self.tables:
             conditions.append(f"r2 < {WITHIN}_there")
@@ -78,7 +78,7 @@ def place(name: str, a: int, b: int) -> str:
     return f"{name}_{a}_{b}"
 
 
-def _chosen(kind: str, of_kinds: list[str]) -> str:
+def chosen(kind: str, of_kinds: list[str]) -> str:
     """One of these by its number, the last where it is none of those before."""
     text = of_kinds[-1]
     for k in range(len(of_kinds) - 2, -1, -1):

@@ -45,14 +45,14 @@ class Chosen:
         self.between, self.truncated = groups is not None, truncated
         self.kinds: list[Any] = []
         if self.between:
-            if group is not None or not _are_groups(groups) or len(groups) != 2:
+            if group is not None or not are_groups(groups) or len(groups) != 2:
                 raise validate.fail(
                     owner, "groups", "be two groups, and group be left out", groups,
                     "give groups=(these, those)",
                 )  # fmt: skip
             self.kinds = list(groups)
         elif self.tables:
-            if not _are_groups(group):
+            if not are_groups(group):
                 raise validate.fail(
                     owner, "group", f"be a list of groups, one a kind, with {self._names}", group,
                     "give group=[these, those]",
@@ -130,7 +130,11 @@ class Chosen:
         """Kinds by slot and excluded partners by particle, of all worlds."""
         self.pairs, self.held = pairs, {}
         if self.names:
-            kinds = [peer.chosen._kinds(model, w) for w, peer in enumerate(peers)]
+            argument = "groups" if self.between else "group"
+            kinds = [
+                kinds_of(model.scenes[w], peer.chosen.kinds, self.owner, argument)
+                for w, peer in enumerate(peers)
+            ]
             self.kind_of = model.array(np.concatenate(kinds), model.precision.scalar)
             self.held["kind"] = pairs.hold(self.kind_of)
         rows = _partners(model, topology.merged(
@@ -159,20 +163,6 @@ class Chosen:
             fields[name] = wp.array(values, dtype=array.dtype, device=array.device)
         return fields
 
-    def _kinds(self, model: Model, w: int) -> np.ndarray:
-        """The kind of each particle of a world; what is of none is never asked for."""
-        scene = model.scenes[w]
-        result = np.full(scene.particle_count, -1.0)
-        for k, group in enumerate(self.kinds):
-            rows = select(scene, group, self.owner)
-            if (result[rows] >= 0).any():
-                raise validate.fail(
-                    self.owner, "groups" if self.between else "group",
-                    "be groups that have no particle in common", group, "name each particle once",
-                )  # fmt: skip
-            result[rows] = k
-        return result
-
     def excluded(self) -> np.ndarray:
         """Excluded pairs of a scene, (m, 2)."""
         found = [np.zeros((0, 2), dtype=np.int64)]
@@ -194,7 +184,22 @@ def _partners(model: Model, pairs: np.ndarray) -> np.ndarray:
     return rows
 
 
-def _are_groups(value: Any) -> bool:
+def kinds_of(scene: Any, kinds: Sequence[Any], owner: str, argument: str) -> np.ndarray:
+    """By particle of a scene which of these groups it is of, (n,); -1 where of none."""
+    result = np.full(scene.particle_count, -1.0)
+    for k, group in enumerate(kinds):
+        rows = select(scene, group, owner)
+        if (result[rows] >= 0).any():
+            raise validate.fail(
+                owner, argument, "be groups that have no particle in common", group,
+                "name each particle once",
+            )  # fmt: skip
+        result[rows] = k
+    return result
+
+
+def are_groups(value: Any) -> bool:
+    """It is a list of groups or of their names."""
     listed = isinstance(value, list | tuple) and len(value) > 0
     return listed and all(isinstance(each, Group | str) for each in value)
 

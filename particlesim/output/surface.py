@@ -179,10 +179,12 @@ class Surface:
         shared = [len(np.intersect1d(self.rows, members)) for members in self._fluids()]
         if max(shared, default=0) > 0:
             sph = self._sph()[int(np.argmax(shared))]
-            h, density = self._length_of(sph), sph.parameters.get("rest_density")
-            if density is None:
+            h, densities = self._length_of(sph), sph.fluids.densities
+            if densities is None:
                 return h
-            volume = float(self.scene.mass[self.rows].mean()) / density
+            shared = [len(np.intersect1d(self.rows, select(self.scene, each, "Surface")))
+                      for each in sph.fluids.groups]  # fmt: skip
+            volume = float(self.scene.mass[self.rows].mean()) / densities[int(np.argmax(shared))]
             return min(h, SPACINGS * volume ** (1 / sph.dimension))
         radius = self.scene.radius[self.rows]
         if not radius.any():

@@ -2,14 +2,38 @@
 
 import pytest
 
-from particlesim.commands.scene_files import ready_scenes
+from particlesim.commands.scene_files import load_scene, ready_scenes
 
-# What others stand for in every run: sod_tube for gases with heat, plummer_sphere for gravity,
-# lj_melt for liquids, pile for contacts, spring_lattice for solids; these themselves are swept in
-# the long one.
+# Options that make scenes small; the others are.
+SMALL = {
+    "dam_break": {"spacing": 0.05},
+    "elastic_rings": {"spacing": 0.25},
+    "elliptical_drop": {"across": 20},
+    "freezing": {"cells": 5},
+    "galaxy_collision": {"count": 240, "softening": 0.2},
+    "gas_in_a_box": {"count": 300},
+    "lj_melt": {"cells": 4},
+    "molten_salt": {"edge": 4, "tolerance": 1e-4},
+    "phase_transition": {"cells": 4},
+    "pile": {"count": 100},
+    "plummer_sphere": {"count": 240},
+    "polymer_melt": {"edge": 6},
+    "polytrope": {"count": 300},
+    "sedov_blast": {"side": 10},
+    "sod_tube": {"count": 90},
+    "standing_wave": {"spacing": 1 / 16},
+    "star_collision": {"count": 120},
+    "taylor_green": {"count": 20},
+    "toy_star": {"count": 250},
+}
+
+# What others stand for in every run: sod_tube for gases with heat, dam_break for SPH with walls,
+# plummer_sphere for gravity, lj_melt for liquids, pile for contacts, spring_lattice for solids;
+# these themselves are swept in the long one.
 LONG = {
-    "elastic_rings", "galaxy_collision", "molten_salt", "phase_transition", "polymer_melt",
-    "sedov_blast", "star_collision",
+    "elastic_rings", "elliptical_drop", "freezing", "galaxy_collision", "molten_salt",
+    "phase_transition", "poiseuille", "polymer_melt", "polytrope", "sedov_blast", "standing_wave",
+    "star_collision", "taylor_green", "toy_star",
 }  # fmt: skip
 
 
@@ -17,3 +41,9 @@ def swept():
     """All ready scenes, as parameters of a test."""
     for name in ready_scenes():
         yield pytest.param(name, marks=[pytest.mark.slow] * (name in LONG))
+
+
+def small(name, **options):
+    """The module of a ready scene, and its scene as small as tests want it, or with options."""
+    module = load_scene(name)
+    return module, module.build(**SMALL.get(name, {}) | options)

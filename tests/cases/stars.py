@@ -1,4 +1,4 @@
-"""Particles that make stars: homogeneous balls and discs, and how to spread them."""
+"""Particles that make stars: homogeneous balls and discs."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ def ball(count):
     cells = int(np.ceil(2 / constant)) + 2
     x = ps.sample.lattice("fcc", (cells,) * 3, constant)
     x -= x.mean(axis=0)
-    return x[np.argsort(np.linalg.norm(x, axis=1), kind="stable")[:count]]
+    return innermost(x, count)
 
 
 def disc(count):
@@ -20,15 +20,10 @@ def disc(count):
     rows = np.arange(-count // 2, count // 2 + 1) if count < 40 else np.arange(-30, 31)
     i, j = np.meshgrid(rows, rows)
     x = np.stack([side * (i + j / 2), side * np.sqrt(3) / 2 * j, 0.0 * i], axis=-1).reshape(-1, 3)
-    return x[np.argsort(np.linalg.norm(x, axis=1), kind="stable")[:count]]
+    return innermost(x, count)
 
 
-def spread(x, dimension, mass_within):
-    """Move the points of a homogeneous ball of radius 1 along their radii to another profile.
-
-    ``mass_within(radius)`` is the mass fraction of the profile, from 0 to 1.
-    """
-    r = np.linalg.norm(x, axis=1)
-    radius = np.linspace(0, 1, 4001)
-    target = np.interp(np.minimum(r**dimension, 1), mass_within(radius), radius)
-    return x * np.divide(target, r, out=np.ones_like(r), where=r > 0)[:, None]
+def innermost(x, count):
+    """The nearest to the centre; those beyond the radius 1 on it."""
+    x = x[np.argsort(np.linalg.norm(x, axis=1), kind="stable")[:count]]
+    return x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1.0)

@@ -7,24 +7,7 @@ import pytest
 
 import particlesim as ps
 from cases.ledger import EPS, G, assert_closed, busy, stepped, stone
-from cases.ready import swept
-from particlesim.commands.scene_files import load_scene
-
-SMALL = {
-    "dam_break": {"spacing": 0.05},
-    "star_collision": {"count": 150},
-    "sod_tube": {"count": 90},
-    "sedov_blast": {"side": 10},
-    "plummer_sphere": {"count": 300},
-    "galaxy_collision": {"count": 300, "softening": 0.2},
-    "freezing": {"cells": 5},
-    "lj_melt": {"cells": 4},
-    "molten_salt": {"edge": 4, "tolerance": 1e-4},
-    "phase_transition": {"cells": 4},
-    "gas_in_a_box": {"count": 400},
-    "pile": {"count": 100},
-}
-
+from cases.ready import small, swept
 
 # Known works --------------------------------------------------------------------------------------
 
@@ -151,8 +134,7 @@ def test_a_bounce_takes_its_share(restitution, device):
 
 @pytest.mark.parametrize("name", swept())
 def test_every_ready_scene_closes(name, device):
-    module = load_scene(name)
-    scene = module.build(**SMALL.get(name, {}))
+    module, scene = small(name)
     settings = module.settings.replace(ledger=True, substeps=min(module.settings.substeps, 100))
     for other in ("float32", "float64"):
         sim = ps.Simulation(scene, settings.replace(precision=other), device=device)

@@ -9,23 +9,9 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from cases.ready import swept
+from cases.ready import small, swept
 from cases.stability import chain, grains, oscillator, simulation
 from particlesim.instruments.stability import StabilityWarning
-
-SMALL = {
-    "dam_break": {"spacing": 0.05},
-    "star_collision": {"count": 150},
-    "sod_tube": {"count": 90},
-    "sedov_blast": {"side": 10},
-    "plummer_sphere": {"count": 300},
-    "galaxy_collision": {"count": 300, "softening": 0.2},
-    "freezing": {"cells": 5},
-    "lj_melt": {"cells": 4},
-    "molten_salt": {"edge": 4, "tolerance": 1e-4},
-    "phase_transition": {"cells": 4},
-    "gas_in_a_box": {"count": 400},
-}
 
 
 def test_worlds_and_what_binds():
@@ -176,8 +162,8 @@ def test_tradeoff_of_dt_auto():
 
 @pytest.mark.parametrize("name", swept())
 def test_ready_scenes_are_within_their_limits(name):
-    module = importlib.import_module(f"particlesim.scenes.{name}")
-    sim = ps.Simulation(module.build(**SMALL.get(name, {})), module.settings, device="cpu")
+    module, scene = small(name)
+    sim = ps.Simulation(scene, module.settings, device="cpu")
     report = sim.stability()
     assert report.safe, str(report)
 
@@ -191,8 +177,7 @@ DURATIONS = {
 
 @pytest.mark.parametrize(("name", "duration"), DURATIONS.items())
 def test_force_scenes_are_bounded_just_below_their_limit(name, duration):
-    module = importlib.import_module(f"particlesim.scenes.{name}")
-    scene = module.build(**SMALL.get(name, {}))
+    module, scene = small(name)
     sim = ps.Simulation(scene, module.settings, device="cpu")
     dt = 0.9 * sim.stability().dt
     sim = ps.Simulation(

@@ -3,31 +3,19 @@
 import pytest
 
 import particlesim as ps
+from cases.ready import small
 from cases.watchdog import falling, quietly
 from particlesim.engine.frames import Frames
 from particlesim.instruments.watchdog.trace import REFINEMENTS
 
 # False alarms -----------------------------------------------------------------------------------
 
-SMALL = {
-    "dam_break": {"spacing": 0.05},
-    "star_collision": {"count": 150},
-    "freezing": {"cells": 5},
-    "lj_melt": {"cells": 4},
-    "molten_salt": {"edge": 4, "tolerance": 1e-4},
-    "phase_transition": {"cells": 4},
-    "gas_in_a_box": {"count": 400},
-    "pile": {"count": 100},
-}
-
 
 @pytest.mark.parametrize("name", ["dam_break", "star_collision", "gas_in_a_box", "triple_pendulum",
                                   "three_body", "pile", "chain", "spring_lattice"])  # fmt: skip
 def test_ready_scenes_raise_no_alarm(name, device, alarms):
-    from particlesim.commands.scene_files import load_scene
-
-    module = load_scene(name)
-    sim = ps.Simulation(module.build(**SMALL.get(name, {})), module.settings, device=device)
+    module, scene = small(name)
+    sim = ps.Simulation(scene, module.settings, device=device)
     for _ in range(12):
         sim.step()
     assert not alarms

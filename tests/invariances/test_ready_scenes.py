@@ -3,34 +3,18 @@
 That a run in two halves is the whole is in tests/output/checkpoint/test_checkpoint.py.
 """
 
-import importlib
-
 import numpy as np
 import pytest
 
 import particlesim as ps
-from cases.ready import swept
+from cases.ready import small, swept
 
-SMALL = {
-    "dam_break": {"spacing": 0.06},
-    "star_collision": {"count": 120},
-    "sod_tube": {"count": 90},
-    "sedov_blast": {"side": 10},
-    "plummer_sphere": {"count": 240},
-    "galaxy_collision": {"count": 240, "softening": 0.2},
-    "freezing": {"cells": 5},
-    "lj_melt": {"cells": 4},
-    "molten_salt": {"edge": 4, "tolerance": 1e-4},
-    "phase_transition": {"cells": 4},
-    "gas_in_a_box": {"count": 300},
-    "polymer_melt": {"edge": 6},
-}
 FRAMES = 3
 
 
 def described(name):
-    module = importlib.import_module(f"particlesim.scenes.{name}")
-    return module.build(**SMALL.get(name, {})), module.settings
+    module, scene = small(name)
+    return scene, module.settings
 
 
 def run(scenes, settings, each_frame=lambda sim: None):

@@ -66,6 +66,18 @@ def test_stretch_gives_the_polytrope():
     assert np.allclose(cosine, 1.0, atol=1e-13)
 
 
+def test_stretch_in_a_plane_and_on_a_line():
+    # rho = 1 - r^2: m(r) / m(1) = 2 r^2 - r^4 and 1.5 r - 0.5 r^3; R / intervals^2 as above.
+    line = np.linspace(-1, 1, 50)[:, None] * [1.0, 0, 0]
+    disc = sample.box((-1, -1, 0), (1, 1, 0), 0.1)
+    disc = disc[np.linalg.norm(disc, axis=1) < 1]
+    for points, dimension in ((line, 1), (disc, 2)):
+        star = sample.stretch(points, (0, 0, 0), 1.0, lambda r: 1 - r**2, dimension)
+        before, after = np.linalg.norm(points, axis=1), np.linalg.norm(star, axis=1)
+        within = {1: 1.5 * after - 0.5 * after**3, 2: 2 * after**2 - after**4}[dimension]
+        assert np.allclose(within, before**dimension, atol=2e-7)
+
+
 def test_stretch_keeps_a_uniform_ball_and_its_centre():
     ball = sample.sphere((1, 2, 3), 1.0, 0.2)
     assert np.allclose(sample.stretch(ball, (1, 2, 3), 1.0, np.ones_like), ball, atol=1e-6)
@@ -156,6 +168,10 @@ def test_maxwell_boltzmann_edges():
         (
             lambda: sample.stretch([ORIGIN], ORIGIN, 1.0, lambda r: r[:5]),
             "sample.stretch: density must return shape",
+        ),
+        (
+            lambda: sample.stretch([ORIGIN], ORIGIN, 1.0, np.ones_like, 4),
+            "sample.stretch: dimension must be 1, 2 or 3",
         ),
         (
             lambda: sample.maxwell_boltzmann(3, -1.0, 1.0),

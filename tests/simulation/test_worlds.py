@@ -166,6 +166,7 @@ def test_one_world_explodes_and_is_healed(device):
             same(sim.world(w), alone)
 
 
+@pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("method", SETTINGS)
 @pytest.mark.parametrize("build", [fluids, clouds])
 def test_reset_of_some_worlds(build, method, precision, device):

@@ -5,8 +5,8 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from cases.stars import ball, disc, spread
-from particlesim.scenes import sedov_blast, sod_tube
+from cases.stars import ball, disc
+from particlesim.scenes import polytrope, sedov_blast, sod_tube
 
 
 def tube(count, **knobs):
@@ -169,28 +169,16 @@ def test_sound_moves_at_that_of_the_gas():
 
 def check_polytrope(count, rms):
     """A star of P = K rho^2 comes to rest with the density of Lane and Emden."""
-    fraction = lambda r: (np.sin(np.pi * r) - np.pi * r * np.cos(np.pi * r)) / np.pi  # noqa: E731
-    spacing = (4 * np.pi / 3 / count) ** (1 / 3)
-    scene = ps.Scene()
-    scene.add_particles(spread(ball(count), 3, fraction), mass=1 / count)
-    scene.add_interaction(
-        ps.SPH(smoothing_length=ps.AdaptiveSmoothing(1.2),
-               equation_of_state=ps.Polytrope(2 / np.pi, 1.0))
-    )  # fmt: skip
-    scene.add_interaction(ps.Gravity(G=1.0, softening=0.3 * spacing))
-    scene.add_interaction(ps.Drag(linear=4.0 / count))
     # The speed of sound is 1 in the middle, where h is 1.2 (m / (pi / 4))^(1/3) = 0.8 spacings.
-    settings = ps.Settings(dt=1.0, substeps=int(np.ceil(4 / spacing)), integrator="velocity_verlet")
-    sim = ps.Simulation(scene, settings, device="cpu")
-    sim.run(40)
+    spacing = (4 * np.pi / 3 / count) ** (1 / 3)
+    settings = polytrope.settings.replace(substeps=int(np.ceil(2 / spacing)))
+    sim = ps.Simulation(polytrope.build(count), settings, device="cpu")
+    sim.run(80)
     found = sim.diagnostics()
     assert found.kinetic[0] < 1e-5 * abs(found.potential[0])
-    r, density = np.linalg.norm(sim.position, axis=1), sim.get("density")
-    inside = r < 0.8
-    error = density[inside] / (np.pi / 4 * np.sinc(r[inside])) - 1
-    assert np.sqrt(np.mean(error**2)) < rms
+    assert polytrope.error(sim) < rms
     # The outermost particles stand some two of their own spacings inside of the surface.
-    assert 0.8 < r.max() < 1.02
+    assert 0.8 < np.linalg.norm(sim.position, axis=1).max() < 1.02
 
 
 @pytest.mark.slow
@@ -208,11 +196,6 @@ def trap(position: wp.vec3, mass: float):
     return -mass * position
 
 
-FRACTIONS = {
-    1: lambda r: 1.5 * r - 0.5 * r**3,
-    2: lambda r: 2 * r**2 - r**4,
-    3: lambda r: 2.5 * r**3 - 1.5 * r**5,
-}
 MASS = {1: 4 / 3, 2: np.pi / 2, 3: 8 * np.pi / 15}  # of the density 1 - r^2
 
 
@@ -226,7 +209,8 @@ def test_toy_star(dimension, count, rms):
               2: disc, 3: ball}[dimension](count)  # fmt: skip
     mass = MASS[dimension] / count
     scene = ps.Scene()
-    scene.add_particles(spread(points, dimension, FRACTIONS[dimension]), mass=mass)
+    star = ps.sample.stretch(points, (0, 0, 0), 1.0, lambda r: 1 - r**2, dimension)
+    scene.add_particles(star, mass=mass)
     scene.add_interaction(
         ps.SPH(smoothing_length=ps.AdaptiveSmoothing(1.2 if dimension == 3 else 1.6),
                equation_of_state=ps.Polytrope(0.25, 1.0), dimension=dimension)

@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from cases.stars import ball, disc, spread
+from cases.stars import ball, disc
 from particlesim.interactions.fluid.smoothing import SMOOTHING
 
 
@@ -27,10 +27,11 @@ AT_REST = 1e-7  # kinetic over potential energy, as phantom asks
 
 def relaxed_polytrope(count):
     """A self-gravitating ball with P = K rho^2, M = R = G = 1, damped until it rests."""
-    fraction = lambda r: (np.sin(np.pi * r) - np.pi * r * np.cos(np.pi * r)) / np.pi  # noqa: E731
     spacing = (4 * np.pi / 3 / count) ** (1 / 3)
     scene = ps.Scene()
-    star = scene.add_particles(spread(ball(count), 3, fraction), mass=1 / count)
+    star = scene.add_particles(
+        ps.sample.stretch(ball(count), (0, 0, 0), 1.0, np.sinc), mass=1 / count
+    )
     scene.add_interaction(
         ps.SPH(star, smoothing_length=spacing, equation_of_state=ps.Polytrope(2 / np.pi, index=1.0))
     )
@@ -85,11 +86,6 @@ def test_polytrope_large():
     check_polytrope(*relaxed_polytrope(4000))
 
 
-FRACTIONS = {
-    1: lambda r: 1.5 * r - 0.5 * r**3,
-    2: lambda r: 2 * r**2 - r**4,
-    3: lambda r: 2.5 * r**3 - 1.5 * r**5,
-}
 MASS = {1: 4 / 3, 2: np.pi / 2, 3: 8 * np.pi / 15}  # of the density 1 - r^2
 VOLUME = {1: 2.0, 2: np.pi, 3: 4 * np.pi / 3}
 
@@ -104,7 +100,9 @@ def toy_star(dimension, count, dt, start=None):
     h = (1.0 if dimension == 3 else 1.6) * (VOLUME[dimension] / count) ** (1 / dimension)
     mass = MASS[dimension] / count
     scene = ps.Scene()
-    x = spread(points, dimension, FRACTIONS[dimension]) if start is None else start
+    x = start
+    if start is None:
+        x = ps.sample.stretch(points, (0, 0, 0), 1.0, lambda r: 1 - r**2, dimension)
     star = scene.add_particles(x, velocity=0.0 if start is None else 0.05 * x, mass=mass)
     scene.add_interaction(
         ps.SPH(star, smoothing_length=h, equation_of_state=ps.Polytrope(0.25, 1.0),

@@ -6,8 +6,12 @@ slot order; the second sums the force from the states of both particles:
     rho_i = sum_j m_j W_ij
     f_i   = -m_i sum_j m_j (P_i/rho_i^2 + P_j/rho_j^2 + Pi_ij) grad_i W_ij
 
-Laws of the fluid reach the terms bound to their parameters (:func:`bound_law`). Everything between
+Laws of the fluid reach the terms bound to their parameters (see :mod:`.laws`). Everything between
 a neighbour's index and its contribution is free of branches, so that the loops vectorise.
+
+Where a fluid is ``several`` ones, "m" is one weight for all particles in place of the mass, and
+"rho" what that makes of their number: then rho_i = m_i n_i (Hu and Adams 2006), and pressures push
+by P/n^2. Only laws ask for masses and densities as they are, by the ``share`` m_i of a weight.
 """
 
 import functools
@@ -17,22 +21,10 @@ from typing import Any
 import warp as wp
 
 from ...engine.loops import Term, reader
-from ...precision import Precision, function, function_from_source
-from ...warp_internals import arguments as arguments_of
+from ...precision import Precision, function
 
 # Where coincident particles are pushed along, within the line or plane of a lower dimension.
 DIRECTIONS = {1: (1.0, 0.0, 0.0), 2: (0.6, 0.8, 0.0), 3: (0.48, 0.6, 0.64)}
-
-
-def bound_law(
-    name: str, law: wp.Function, variables: tuple[str, ...], sources: Mapping[str, str],
-    precision: Precision, params: Any,
-) -> wp.Function:  # fmt: skip
-    """``name(*variables, p)`` that calls ``law`` with, for each of its arguments, its source."""
-    arguments = ", ".join(sources[argument] for argument in arguments_of(law))
-    signature = ", ".join(f"{variable}: real" for variable in variables)
-    source = f"def {name}({signature}, p: Params):\n    return law({arguments})\n"
-    return function_from_source(source, {"law": law, "real": precision.scalar, "Params": params})
 
 
 def density_term(weight: wp.Function, precision: Precision, data: Any, params: Any) -> Term:
@@ -60,27 +52,34 @@ def own_weight(weight: wp.Function, precision: Precision, data: Any, params: Any
 @functools.cache
 def keep_state(
     own: wp.Function, pressure: wp.Function, sound_speed: wp.Function | None, hot: bool,
-    precision: Precision, data: Any, params: Any, out: Any,
+    several: bool, precision: Precision, data: Any, params: Any, out: Any,
 ) -> wp.Function:  # fmt: skip
     """Store: density and pressure of the particle, and (m, rho, P/rho^2, c) in slot order.
 
     ``own(i, d, p)`` is what a particle weighs in its own sum; ``sound_speed`` None leaves c at 0;
-    ``hot``: the data hold internal energies u.
+    ``hot``: the data hold internal energies u; ``several``: and which fluid each is of.
     """
     real, one, vec4 = precision.scalar, precision.vector(1), precision.vector(4)
     sounds = sound_speed is not None
 
     def keep(i: int, particle: int, total: one, d: data, p: params, o: out):
         m = d.m[i]
-        rho = p.sigma * (total[0] + m * own(i, d, p))  # the sum is over the others
+        n = p.sigma * (total[0] + m * own(i, d, p))  # the sum is over the others
+        rho = n
         u = real(0.0)
         if wp.static(hot):
             u = d.u[i]
-        pressure_i = pressure(rho, u, p)
         c = real(0.0)
-        if wp.static(sounds):
-            c = sound_speed(rho, u, pressure_i, p)
-        o.state[i] = vec4(m, rho, pressure_i / (rho * rho), c)
+        if wp.static(several):
+            rho = n * (d.mass[i] * p.share)
+            pressure_i = pressure(rho, u, d.fluid[i], p)
+            if wp.static(sounds):
+                c = sound_speed(rho, u, pressure_i, d.fluid[i], p)
+        else:
+            pressure_i = pressure(rho, u, p)
+            if wp.static(sounds):
+                c = sound_speed(rho, u, pressure_i, p)
+        o.state[i] = vec4(m, n, pressure_i / (n * n), c)
         o.rho[particle] = rho
         o.pressure[particle] = pressure_i
 
@@ -88,8 +87,8 @@ def keep_state(
 
 
 def pull_function(
-    slope: wp.Function, viscosity: wp.Function | None, switched: bool, precision: Precision,
-    data: Any, params: Any,
+    slope: wp.Function, viscosity: wp.Function | None, switched: bool, several: bool,
+    precision: Precision, data: Any, params: Any,
 ) -> wp.Function:  # fmt: skip
     """``pull(i, j, approach, r2, d, p)``: w of f_ij / m_i = w x_ij, see :func:`force_term`."""
     real, state_of, read = precision.scalar, reader(precision, 4), reader(precision)
@@ -101,7 +100,14 @@ def pull_function(
         stress = state_i[2] + state_j[2]
         if wp.static(viscous):
             mean = real(0.5) * (state_i + state_j)
-            pi_ij = viscosity(approach, distance2, mean[1], mean[3], p)
+            density = mean[1]
+            if wp.static(several):
+                share_i = read(d.mass, i) * p.share
+                share_j = read(d.mass, j) * p.share
+                density = real(0.5) * (share_i * state_i[1] + share_j * state_j[1])
+            pi_ij = viscosity(approach, distance2, density, mean[3], p)
+            if wp.static(several):
+                pi_ij *= share_i * share_j
             if wp.static(switched):
                 pi_ij *= real(0.5) * (read(d.balsara, i) + read(d.balsara, j))
             stress += pi_ij
@@ -113,15 +119,22 @@ def pull_function(
 
 
 def drag_function(
-    slope: wp.Function, drag: wp.Function, precision: Precision, data: Any, params: Any
-) -> wp.Function:
+    slope: wp.Function, drag: wp.Function, several: bool, precision: Precision, data: Any,
+    params: Any,
+) -> wp.Function:  # fmt: skip
     """``dragged(i, j, r2, d, p)``: w of f_ij / m_i = w v_ij, m_j D_ij W_ij' / r."""
-    real, state_of = precision.scalar, reader(precision, 4)
+    real, state_of, read = precision.scalar, reader(precision, 4), reader(precision)
 
     def dragged(i: int, j: int, r2: real, d: data, p: params):
         state_i = state_of(d.state, i)
         state_j = state_of(d.state, j)
-        D = drag(r2, state_i[1], state_j[1], real(0.5) * (state_i[3] + state_j[3]), p)
+        c = real(0.5) * (state_i[3] + state_j[3])
+        if wp.static(several):
+            share_i = read(d.mass, i) * p.share
+            share_j = read(d.mass, j) * p.share
+            D = drag(r2, share_i * state_i[1], share_j * state_j[1], c, p) * (share_i * share_j)
+        else:
+            D = drag(r2, state_i[1], state_j[1], c, p)
         gradient = (state_j[0] * p.sigma) * slope(wp.sqrt(r2) * p.inverse_h)
         return (gradient * D * p.inverse_h) * p.inverse_h
 
@@ -187,7 +200,7 @@ def heat_term(
     aside, read = vec3(*DIRECTIONS[dimension]), reader(precision)
     viscosity, both = laws.get("term"), kicks == 2
     viscous, drags = viscosity is not None, "drag" in laws
-    dragged = drag_function(slope, laws["drag"], precision, data, params) if drags else None
+    dragged = drag_function(slope, laws["drag"], False, precision, data, params) if drags else None
 
     def warm(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
         apart = r2 > p.closest_squared
@@ -247,24 +260,29 @@ def add_force(precision: Precision, data: Any, params: Any, out: Any) -> wp.Func
 
 @functools.cache
 def keep_measure(
-    energy: wp.Function, hot: bool, own: bool, precision: Precision, data: Any, params: Any,
-    out: Any,
+    energy: wp.Function, hot: bool, own: bool, several: bool, precision: Precision, data: Any,
+    params: Any, out: Any,
 ) -> wp.Function:  # fmt: skip
     """Store: the particle's energy m u and its share of the virial.
 
-    ``own``: it has a smoothing length of its own, which the law takes too.
+    ``own``: it has a smoothing length of its own, which the law takes too; ``several``: it is
+    of one of several fluids.
     """
     real, one = precision.scalar, precision.vector(1)
 
     def keep(i: int, particle: int, total: one, d: data, p: params, o: out):
         u = real(0.0)
+        m = d.m[i]
         if wp.static(hot):
             u = d.u[i]
         if wp.static(own):
             u = energy(d.state[i][1], u, real(1.0) / d.size[i][0], p)
+        elif wp.static(several):
+            m = d.mass[i]
+            u = energy(d.state[i][1] * (m * p.share), u, d.fluid[i], p)
         else:
             u = energy(d.state[i][1], u, p)
-        o.energy[particle] = o.energy[particle] + wp.float64(d.m[i] * u)
+        o.energy[particle] = o.energy[particle] + wp.float64(m * u)
         o.virial[particle] = o.virial[particle] + wp.float64(total[0])
 
     return function(keep)

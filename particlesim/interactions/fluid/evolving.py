@@ -13,6 +13,7 @@ from ...engine.model import Model
 from ...engine.state import State
 from ...scene.part import Interaction, Part
 from .heat import ENERGY, Heat
+from .interfaces.fluids import Fluids
 from .lengths import LENGTH, AdaptiveSmoothing, Lengths
 from .smoothing.smoothing_function import Smoothing
 from .walls import Walls
@@ -26,6 +27,9 @@ class Evolving(Interaction):
     hot: bool
     dimension: int
     smoothing: Smoothing
+    fluids: Fluids
+    pairs: Any  # the list, once prepared
+    parameters: dict[str, Any]
     adaptive: AdaptiveSmoothing | None = None
     heat: Heat | None = None  # once attached
     lengths: Lengths | None = None  # once prepared
@@ -108,6 +112,18 @@ class Evolving(Interaction):
 
     def presses(self, wall: Part) -> np.ndarray | None:
         return self.walls.pressed(wall) if self.walls else None
+
+    def fluid_numbers(self) -> np.ndarray:
+        """Of every particle of the worlds which of several fluids it is of, (n,)."""
+        each = zip(self.peers, self.model.scenes, strict=True)
+        return np.concatenate([peer.fluids.numbers(scene) for peer, scene in each])
+
+    def by_member(self) -> dict[str, np.ndarray]:
+        """Parameters of each member, (m,); of those by fluids that of its own."""
+        rows = self.pairs.members_host
+        world, number = self.model.world_of[rows], self.fluid_numbers()[rows]
+        columns = {name: values[world] for name, values in self.columns(self.parameters).items()}
+        return self.fluids.by_particle(columns, number)
 
     def smoothing_lengths(self, rows: np.ndarray) -> np.ndarray:
         """h of these members at the last forces [length]."""

@@ -176,8 +176,7 @@ class _Field:
 
     def _loop(self, **more: wp.array) -> PairLoop:
         sph = self.sph
-        own = sph.pairs.fields
-        fields = {"x": own["position"], "m": own["mass"], "state": sph.slot_state, "a": self.values}
+        fields = {name: sph.fields[name] for name in ("x", "m", "state")} | {"a": self.values}
         return PairLoop.over(
             sph.model, sph.pairs, "FluidField", {**fields, **more}, sph.Params, sph.params
         )

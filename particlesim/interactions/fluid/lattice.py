@@ -41,14 +41,20 @@ def lattice_sum(smoothing: Smoothing, dimension: int, ratio: float) -> float:
 def spacings(fluid: Any, model: Model) -> np.ndarray:
     """Of the lattice that particles of their mean mass make at the rest density, by world.
 
-    (m / rho_0)^(1/d) [length]; 0 where the fluid has no rest density, or no particles.
+    (m / rho_0)^(1/d) [length], of several fluids by the mean of their volumes; 0 where the fluid
+    has no rest density, or no particles.
     """
     found, mass = np.zeros(model.world_count), model.column("mass")
+    number = fluid.fluid_numbers()
     for w, peer in enumerate(fluid.peers):
         rows = fluid.pairs.members_host[fluid.pairs.begin_host[w] : fluid.pairs.end_host[w]]
-        if len(rows) and "rest_density" in peer.parameters:
-            volume = mass[rows].mean() / peer.parameters["rest_density"]
-            found[w] = volume ** (1.0 / fluid.dimension)
+        if len(rows) and peer.fluids.densities:
+            own = [rows[number[rows] == k] for k in range(len(peer.fluids.densities))]
+            volumes = [
+                mass[each].mean() / density
+                for each, density in zip(own, peer.fluids.densities, strict=True) if len(each)
+            ]  # fmt: skip
+            found[w] = np.mean(volumes) ** (1.0 / fluid.dimension)
     return found
 
 

@@ -33,9 +33,8 @@ def fluid_limits(part: Any, probe: Probe) -> list[Limit]:
     rows = part.pairs.members_host
     if not len(rows):
         return []
-    columns = part.columns(part.parameters)
-    each = {name: values[probe.model.world_of[rows]] for name, values in columns.items()}
-    c = part.sound_speeds(probe)
+    each = part.by_member()
+    c = _heard(part, probe, part.sound_speeds(probe))
     h = each["smoothing_length"] = part.smoothing_lengths(rows)
     omega = c * steepest(part.smoothing, part.dimension) / h
     gamma = _damping_rates(part, probe, each, c)
@@ -52,6 +51,17 @@ def fluid_limits(part: Any, probe: Probe) -> list[Limit]:
         dt = ACCELERATION * float(np.sqrt(h[k] / a[k]))
         limits.append(Limit(part.name, "acceleration", dt, reason, *probe.place(int(rows[k]))))
     return limits + _shifting_limit(part, probe, each)
+
+
+def _heard(part: Any, probe: Probe, c: np.ndarray) -> np.ndarray:
+    """Speeds of sound; of several fluids a light one's particles feel the stiffest at hand."""
+    if not part.fluids.several:
+        return c
+    rows = part.pairs.members_host
+    rho, world = probe.state.density.numpy()[rows].astype(np.float64), probe.model.world_of[rows]
+    stiffest = np.zeros(probe.model.world_count)
+    np.maximum.at(stiffest, world, rho * c**2)
+    return np.sqrt(stiffest[world] / rho)
 
 
 def _shifting_limit(part: Any, probe: Probe, each: dict[str, np.ndarray]) -> list[Limit]:

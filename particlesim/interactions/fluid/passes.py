@@ -16,6 +16,7 @@ from ...engine.probe import Probe
 from ...engine.state import State
 from ...kernels.interactions.fluid import lengths as of_lengths
 from ...kernels.interactions.fluid import sph as kernels
+from ...kernels.interactions.fluid.laws import bound_law
 from ..pair_loop import PairLoop
 from .equations_of_state import EquationOfState
 from .evolving import Evolving
@@ -68,8 +69,14 @@ class Passes(Evolving):
         if self.lengths is None:
             columns["inverse_h"] = 1.0 / most
             columns["sigma"] = self.smoothing.sigma / most**self.dimension
-            if "rest_density" in columns:
-                columns["rest_density"] = columns["rest_density"] * lattice_sums(self, model, most)
+            if self.fluids.densities:
+                sums = lattice_sums(self, model, most)
+                columns |= {
+                    name: sums * columns[name] for name in self.fluids.fields["rest_density"]
+                }
+        if self.fluids.several:
+            columns["share"] = np.full(model.world_count, 1.0 / model.mass_unit)
+            self.fluids.hold(model, self.pairs, self.fluid_numbers())
         model.fits(self.name, {name: columns[name] for name in self.parameters})
         self.Params, self.params = model.parameters("FluidParameters", columns)
 
@@ -77,7 +84,7 @@ class Passes(Evolving):
         precision, held = model.precision, self.pairs.fields
         # Mass, density, P / rho^2 and sound speed of each slot, together as they are read together.
         self.slot_state = self.pairs.array(precision.vector(4))
-        fields = {"x": held["position"], "m": held["mass"], "state": self.slot_state}
+        fields = {"x": held["position"], "state": self.slot_state, **self.fluids.read(held["mass"])}
         if self.viscosity:
             fields["v"] = held["velocity"]
         if self.hot:
@@ -121,19 +128,19 @@ class Passes(Evolving):
     def pull(self, *types: Any) -> wp.Function:
         """How strongly a pair pulls, for precision, data and parameters of these types."""
         term, switched = self.laws.get("term"), self.switch is not None
-        return kernels.pull_function(self.slope, term, switched, *types)
+        return kernels.pull_function(self.slope, term, switched, self.fluids.several, *types)
 
     def dragged(self, *types: Any) -> wp.Function | None:
         """How strongly a pair drags; None: it does not."""
         if "drag" not in self.laws:
             return None
-        return kernels.drag_function(self.slope, self.laws["drag"], *types)
+        return kernels.drag_function(self.slope, self.laws["drag"], self.fluids.several, *types)
 
     def _laws(self) -> dict[str, wp.Function]:
         """The parts' laws as functions of their variables and the fluid's parameters."""
         precision = self.model.precision
         return {
-            name: kernels.bound_law(
+            name: bound_law(
                 name, law.function(precision, part.name, float), self.variables(name),
                 self.sources[name], precision, self.Params,
             )
@@ -162,8 +169,9 @@ class Passes(Evolving):
             return
         out = {"state": self.slot_state, "rho": state.density, "pressure": state.pressure}
         own = kernels.own_weight(self.weight, *self._types)
-        store = functools.partial(kernels.keep_state, own, *laws, self.hot)
-        self.walls.sum_density(Pass(self.loop, self.density_term, store, out), (*laws, self.hot))
+        kept = (*laws, self.hot, self.fluids.several)
+        store = functools.partial(kernels.keep_state, own, *kept)
+        self.walls.sum_density(Pass(self.loop, self.density_term, store, out), kept)
         if self.switch:
             self.switch.sum()
 
@@ -197,5 +205,6 @@ class Passes(Evolving):
         precision, energy_law = self.model.precision, self.laws["energy"]
         term = kernels.virial_term(self.force_term, precision, self.loop.Data, self.Params)
         own = self.lengths is not None
-        store = functools.partial(kernels.keep_measure, energy_law, self.hot, own)
+        kept = energy_law, self.hot, own, self.fluids.several
+        store = functools.partial(kernels.keep_measure, *kept)
         self.loop.sum(term, store, {"energy": energy, "virial": virial})

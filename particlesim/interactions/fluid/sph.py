@@ -10,6 +10,7 @@ import numpy as np
 from ... import validate
 from .equations_of_state import EquationOfState
 from .heat import ENERGY
+from .interfaces.fluids import FLUID, Fluids
 from .lengths import LENGTH, AdaptiveSmoothing
 from .passes import Passes
 from .smoothing import SmoothingFunction, summable
@@ -40,6 +41,17 @@ class SPH(Passes):
     The step is bounded by the time of sound across a smoothing length and by the acceleration
     (Monaghan 1992, on time stepping): dt < 0.4 h / (c (1 + 0.6 alpha)) and dt < 0.25 sqrt(h / |a|).
 
+    Several fluids in one, of a rest density and the numbers of one equation of state each, may
+    differ in density by a factor of 1000. Theirs is summed by number, rho_i = m_i sum_j W_ij, as
+    next to a lighter fluid the mass of the neighbours says nothing of one's own, and the force
+
+        F_ij = -(P_i/n_i^2 + P_j/n_j^2 + m_i m_j Pi_ij) grad_i W_ij        (n = rho/m)
+
+    is the gradient of the energy again (Hu and Adams 2006, eqs. 7 and 13; Solenthaler and Pajarola
+    2008): of equal masses the same. All are to start at one spacing. A light fluid next to a heavy
+    one feels the other's stiffness, and the step is that of c = sqrt(rho_1 c_1^2 / rho_2): choose
+    sounds that make rho c^2 alike, or less in the light one, above its pressure by a hundred times.
+
     Over particles of mass rho0 s^d on a square lattice of spacing s the sum is a little more
     than rho0. A fluid that starts there rests there: its equation of state is given the sum for
     the rest density.
@@ -55,13 +67,15 @@ class SPH(Passes):
     the positions at which the forces were taken last.
 
     Args:
-        group: The fluid's particles; None: all. Pinned ones count in the sums and stay.
+        group: The fluid's particles; None: all. Pinned ones count in the sums and stay. Several
+            fluids are a list of groups, with a list of rest densities, of equations of state that
+            differ in their numbers, or of both.
         smoothing_length: h [length], above 0. Where W ends at 2 h, as most functions do, and at a
             spacing s of particles, h = 2 s makes 268 neighbours, 1.3 s makes 74, s makes 33.
             Or an :class:`AdaptiveSmoothing`: each particle its own.
-        rest_density: rho0 [mass/length^d], where the equation of state asks for it.
+        rest_density: rho0 [mass/length^d], where the equation of state asks for it; or one a fluid.
         equation_of_state: :class:`Tait`, :class:`Polytrope`, :class:`IdealGas` or another
-            ``EquationOfState``.
+            ``EquationOfState``; or one a fluid.
         smoothing: W, a :class:`SmoothingFunction` or the name of a ready one: ``"wendland_c2"``
             (does not clump at many neighbours), ``"wendland_c4"``, ``"wendland_c6"``,
             ``"cubic_spline"`` (sharper at few), ``"quintic_spline"``, ``"gaussian"``, ``"poly6"``,
@@ -74,7 +88,8 @@ class SPH(Passes):
             particles are to stay in it.
 
     Raises:
-        ValueError: A value out of range, a name that is not known, a rest density missing.
+        ValueError: A value out of range, a name that is not known, a rest density missing; several
+            fluids with heat or with an :class:`AdaptiveSmoothing`.
 
     Example:
         >>> from particlesim import Scene, Settings, Simulation, Tait, sample
@@ -93,7 +108,8 @@ class SPH(Passes):
 
     def __init__(
         self, group: Any = None, *, smoothing_length: float | AdaptiveSmoothing,
-        equation_of_state: EquationOfState, rest_density: float | None = None,
+        equation_of_state: EquationOfState | Sequence[EquationOfState],
+        rest_density: float | Sequence[float] | None = None,
         smoothing: str | SmoothingFunction = "wendland_c2",
         viscosity: Viscosity | Sequence[Viscosity] | None = None, dimension: int = 3,
     ):  # fmt: skip
@@ -104,22 +120,20 @@ class SPH(Passes):
             )
         self.dimension, self.smoothing = dimension, summable(self.name, smoothing, dimension)
         self.parameters = self.take_length(smoothing_length)
-        self.equation_of_state = _of_kind(
-            self.name, "equation_of_state", equation_of_state, EquationOfState,
-            "Tait(sound_speed)",
-        )  # fmt: skip
+        self.fluids = Fluids(self.name, group, rest_density, equation_of_state)
+        self.equation_of_state = self.fluids.states[0]  # whose laws are those of all
         self.viscosity = several(self.name, viscosity)
         self.reads_velocity, self.conservative = bool(self.viscosity), not self.viscosity
         self._check_adaptive()
-        if rest_density is not None:
-            self.parameters["rest_density"] = validate.number(
-                self.name, "rest_density", rest_density, above=0.0, unit="mass/length^d"
-            )
+        if self.fluids.densities:
+            self.parameters |= self.fluids.keep("rest_density", self.fluids.densities)
         self.sources: dict[str, dict[str, str]] = {}
-        self._take("state", equation_of_state)
+        self._take("state", *self.fluids.states)
         for each in self.viscosity:
             self._take("viscosity", each)
-        self.hot = any(ENERGY in law.parameters for law in equation_of_state.laws.values())
+        laws = self.equation_of_state.laws.values()
+        self.hot = any(ENERGY in law.parameters for law in laws)
+        self._check_several()
         if self.hot:
             self.keep_heat()
 
@@ -132,20 +146,40 @@ class SPH(Passes):
                     "AdaptiveSmoothing", each.name, "choose ArtificialViscosity, or one length",
                 )  # fmt: skip
 
+    def _check_several(self) -> None:
+        """Of several fluids none has heat, or lengths of its particles' own."""
+        if self.fluids.several and (self.hot or self.adaptive):
+            argument = "equation_of_state" if self.hot else "smoothing_length"
+            raise validate.fail(
+                self.name, argument, "have no internal energy with several fluids" if self.hot
+                else "be one number with several fluids", argument, "give each an SPH of its own",
+            )  # fmt: skip
+
     def variables(self, name: str) -> tuple[str, ...]:
         """What a law is called with."""
-        return VARIABLES[name] if self.adaptive is None else (*VARIABLES[name], LENGTH)
+        of_fluid = self.fluids.several and name in EquationOfState.law_names
+        return (*VARIABLES[name], *[LENGTH] * bool(self.adaptive), *[FLUID] * of_fluid)
 
-    def _take(self, prefix: str, part: EquationOfState | Viscosity) -> None:
-        """Note what fills the arguments of a part's laws; its parameters join the fluid's."""
-        own = {name: f"p.{name}" for name in ("smoothing_length", "rest_density")}
+    def _take(self, prefix: str, part: Any, *others: Any) -> None:
+        """Note what fills the arguments of a part's laws; its parameters join the fluid's.
+
+        ``others``: such parts of further fluids.
+        """
+        own = {LENGTH: f"p.{LENGTH}"}
+        if prefix == "state" or not self.fluids.several:
+            own["rest_density"] = self.fluids.source("rest_density")
         for name, value in part.parameters.items():
-            self.parameters[f"{prefix}_{name}"] = value
-            own[name] = f"p.{prefix}_{name}"
+            if others:
+                values = [value, *(other.parameters[name] for other in others)]
+                self.parameters |= self.fluids.keep(f"{prefix}_{name}", values)
+                own[name] = self.fluids.source(f"{prefix}_{name}")
+            else:
+                self.parameters[f"{prefix}_{name}"] = value
+                own[name] = f"p.{prefix}_{name}"
         for name, law in part.laws.items():
             sources = own | {variable: variable for variable in self.variables(name)}
             validate.known(part.name, law.parameters, sources, f"argument of {law.name}")
-            if "rest_density" in law.parameters and "rest_density" not in self.parameters:
+            if "rest_density" in law.parameters and self.fluids.densities is None:
                 raise validate.fail(
                     self.name, "rest_density", "be given [mass/length^d]", None,
                     f"{part.name} asks for it",
@@ -162,13 +196,3 @@ class SPH(Passes):
     def interpolate(self, points: Any, field: Any, **options: Any) -> np.ndarray:
         """Of a simulation: ``sim.interpolate(fluid, points, field)``."""
         raise self._elsewhere("interpolate", "points", "field")
-
-
-def _of_kind(owner: str, argument: str, value: Any, kind: type, example: str) -> Any:
-    """``value``, checked to be of this kind."""
-    if not isinstance(value, kind):
-        article = "an" if kind.__name__[0] in "AEIOU" else "a"
-        raise TypeError(
-            f"{owner}: {argument} must be {article} {kind.__name__}, got {value!r}; give {example}."
-        )
-    return value

@@ -23,14 +23,18 @@ def complaint(fluid: Any) -> str:
     members = fluid.pairs.members_host
     if not len(members):
         return ""
-    model, world = fluid.model, fluid.model.world_of[members]
-    columns = {name: column[world] for name, column in fluid.columns(fluid.parameters).items()}
+    model, columns, number = fluid.model, fluid.by_member(), fluid.fluid_numbers()
     h = columns["smoothing_length"] = fluid.smoothing_lengths(members)
+    own = [number[members] == k for k in range(len(fluid.fluids.groups))]
+    densities = (
+        _of_density(fluid, members[each], {name: column[each] for name, column in columns.items()})
+        for each in own if each.any()
+    )  # fmt: skip
     return (
         _of_energy(fluid, members)
         or model.unresolved(fluid.name, "smoothing_length", h, members)
         or _of_lengths(fluid)
-        or _of_density(fluid, members, columns)
+        or next(filter(None, densities), "")
         or _of_speed(fluid, members, columns)
     )
 

@@ -39,7 +39,7 @@ def sample(sim: Source, observe: Observed | None = None) -> dict[str, np.ndarray
             if getattr(part, "potential", part) is not None:  # a force alone has none
                 values[f"potential:{label}"] = own
         for label, part in zip(_labels(sim.interactions), sim.interactions, strict=True):
-            if isinstance(part, SPH) and "rest_density" in part.parameters:
+            if isinstance(part, SPH) and part.fluids.densities:
                 values |= _figures("density_error", label, *_density_error(part, sim), sim)
         sim.neighbors.update_for_constraints(sim.state)
         sim.neighbors.grow()
@@ -82,9 +82,8 @@ def _density_error(fluid: SPH, sim: Source) -> tuple[np.ndarray, np.ndarray]:
     fluid.update_density()
     members = fluid.pairs.members_host
     world = sim.model.world_of[members]
-    rest = np.array([peer.parameters["rest_density"] for peer in fluid.peers])
     density = sim.state.density.numpy()[members].astype(np.float64)
-    return density / rest[world] - 1.0, world
+    return density / fluid.by_member()["rest_density"] - 1.0, world
 
 
 def _figures(

@@ -89,13 +89,14 @@ def uniform_sphere(center: Any, radius: float, count: int, seed: int = 0) -> np.
 
 
 def stretch(
-    points: Any, center: Any, radius: float, density: Callable[[np.ndarray], Any]
-) -> np.ndarray:
+    points: Any, center: Any, radius: float, density: Callable[[np.ndarray], Any],
+    dimension: int = 3,
+) -> np.ndarray:  # fmt: skip
     """Move the points of a uniform ball along their radii so that they follow a density profile.
 
     A point keeps its mass coordinate, the share of the mass that lies closer to the centre:
 
-        (r_0 / R)^3 = m(r) / m(R),    m(r) = integral_0^r rho(s) s^2 ds
+        (r_0 / R)^d = m(r) / m(R),    m(r) = integral_0^r rho(s) s^(d-1) ds
 
     so particles of equal mass represent rho(r), whatever its normalisation. The error of r is about
     R / STRETCH_INTERVALS^2, also where rho goes to 0 at the surface.
@@ -106,13 +107,14 @@ def stretch(
         center: Centre of the ball (3,) [length].
         radius: Radius R of the ball, before and after [length].
         density: rho(r) for an array of radii in [0, R] [any unit]; not negative.
+        dimension: d: 3; 2 for points that fill a disc, 1 for those of a line.
 
     Returns:
         Points (n, 3) [length], in the same order.
 
     Raises:
         ValueError: A point outside the ball; a density of another shape, not finite, negative or
-            zero everywhere.
+            zero everywhere; another dimension.
 
     Example:
         >>> ball = uniform_sphere((0, 0, 0), 1.0, 1000)
@@ -122,6 +124,8 @@ def stretch(
     rows = validate.rows(owner, "points", points, None, 3)
     middle = validate.vector(owner, "center", center, unit="length")
     radius = validate.number(owner, "radius", radius, above=0.0, unit="length")
+    if dimension not in (1, 2, 3):
+        raise validate.fail(owner, "dimension", "be 1, 2 or 3", dimension, "choose one of these")
     offsets = rows - middle
     old = np.linalg.norm(offsets, axis=1)
     if np.any(old > radius * (1 + 1e-6)):
@@ -129,10 +133,10 @@ def stretch(
             owner, "points", f"lie within {radius:g} of the center [length]", float(old.max()),
             "give the ball's own center and radius",
         )  # fmt: skip
-    nodes, mass = _cumulative_mass(owner, radius, density)
-    # The cube root of the mass coordinate is linear in r near the centre, so that linear
+    nodes, mass = _cumulative_mass(owner, radius, density, dimension)
+    # The d-th root of the mass coordinate is linear in r near the centre, so that linear
     # interpolation of its inverse is as good there as elsewhere.
-    new = np.interp(old / radius, np.cbrt(mass), nodes)
+    new = np.interp(old / radius, mass ** (1.0 / dimension), nodes)
     return middle + offsets * np.divide(new, old, out=np.zeros_like(old), where=old > 0)[:, None]
 
 
@@ -211,7 +215,7 @@ def _throw_darts(
 
 
 def _cumulative_mass(
-    owner: str, radius: float, density: Callable[[np.ndarray], Any]
+    owner: str, radius: float, density: Callable[[np.ndarray], Any], dimension: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Radii from 0 to R, and the share of the mass within each, from 0 to 1."""
     # Nodes crowd quadratically at the surface, where 1 - m goes like (R - r)^(n+1) for a density
@@ -232,5 +236,7 @@ def _cumulative_mass(
             owner, "density", "be finite, not negative, and somewhere positive", rho,
             f"check it on [0, {radius:g}]",
         )  # fmt: skip
-    mass = np.concatenate([[0.0], np.cumsum((half * weights * rho * r * r).sum(axis=1))])
+    mass = np.concatenate(
+        [[0.0], np.cumsum((half * weights * rho * r ** (dimension - 1)).sum(axis=1))]
+    )
     return nodes, mass / mass[-1]

@@ -1,29 +1,14 @@
 """Controls that are the ready scenes, as they are and in other settings."""
 
-import importlib
 from functools import partial
 
 import numpy as np
 
-from particlesim.commands.scene_files import ready_scenes
+from particlesim.commands.scene_files import load_scene, ready_scenes
 
-from ..ready import LONG
+from ..ready import LONG, SMALL
 from .judge import Row, whole
 
-SMALL = {
-    "dam_break": {"spacing": 0.06},
-    "star_collision": {"count": 120},
-    "sod_tube": {"count": 90},
-    "sedov_blast": {"side": 10},
-    "plummer_sphere": {"count": 240},
-    "galaxy_collision": {"count": 240, "softening": 0.2},
-    "freezing": {"cells": 4},
-    "lj_melt": {"cells": 4},
-    "molten_salt": {"edge": 4, "tolerance": 1e-4},
-    "phase_transition": {"cells": 4},
-    "gas_in_a_box": {"count": 300},
-    "polymer_melt": {"edge": 6},
-}
 FRAMES = {"three_body": 20, "triple_pendulum": 20}
 
 
@@ -35,7 +20,7 @@ def sane(done):
 
 def rows():
     for name in ready_scenes():
-        module = importlib.import_module(f"particlesim.scenes.{name}")
+        module = load_scene(name)
         for short, knobs in (
             ("", {}),
             (", in double precision", {"precision": "float64"}),

@@ -1,32 +1,13 @@
 """Scenes to make checkpoints of, and when two simulations are the same."""
 
-import importlib
 import json
 
 import numpy as np
 
 import particlesim as ps
+from cases.ready import small
 from particlesim.commands.scene_files import ready_scenes
 from particlesim.scene.fingerprint import fingerprint
-
-SCENES = list(ready_scenes())
-
-
-SMALL = {
-    "dam_break": {"spacing": 0.05},
-    "star_collision": {"count": 150},
-    "sod_tube": {"count": 90},
-    "sedov_blast": {"side": 10},
-    "plummer_sphere": {"count": 300},
-    "galaxy_collision": {"count": 300, "softening": 0.2},
-    "freezing": {"cells": 5},
-    "lj_melt": {"cells": 4},
-    "molten_salt": {"edge": 4, "tolerance": 1e-4},
-    "phase_transition": {"cells": 4},
-    "polymer_melt": {"edge": 6},
-    "gas_in_a_box": {"count": 400},
-    "pile": {"count": 100},
-}
 
 
 def arrays(sim):
@@ -78,8 +59,4 @@ def pair(charge=1.0, **options):
 
 def described():
     """Fingerprints of all ready scenes, as they are saved."""
-    modules = {name: importlib.import_module(f"particlesim.scenes.{name}") for name in SCENES}
-    return {
-        name: json.dumps(fingerprint([module.build(**SMALL.get(name, {}))]))
-        for name, module in modules.items()
-    }
+    return {name: json.dumps(fingerprint([small(name)[1]])) for name in ready_scenes()}

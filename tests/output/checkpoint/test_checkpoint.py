@@ -1,6 +1,5 @@
 """A restart equals the uninterrupted run bit for bit."""
 
-import importlib
 import json
 import os
 import subprocess
@@ -12,18 +11,18 @@ import pytest
 import warp as wp
 
 import particlesim as ps
+from cases.ready import small, swept
 
-from .checkpoints import SCENES, SMALL, described, pair, restart, ropes
+from .checkpoints import described, pair, restart, ropes
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", swept())
 def test_a_restart_equals_the_uninterrupted_run(name, device, tmp_path):
-    module = importlib.import_module(f"particlesim.scenes.{name}")
-    options = SMALL.get(name, {})
-    sim = ps.Simulation(module.build(**options), module.settings, device=device)
+    module, scene = small(name)
+    sim = ps.Simulation(scene, module.settings, device=device)
     sim.run(3)
     # The scene is built anew, as a new process would.
-    restart(sim, tmp_path / "run.npz", module.build(**options))
+    restart(sim, tmp_path / "run.npz", small(name)[1])
 
 
 @pytest.mark.parametrize("execution", ["graph", "threads"])
@@ -148,10 +147,12 @@ def test_settings_are_those_saved_or_fit_them(device, tmp_path, refused):
 
 def test_fingerprints_hold_in_another_process():
     code = "import json, checkpoints; print(json.dumps(checkpoints.described()))"
+    here = Path(__file__).parent
+    paths = os.pathsep.join(filter(None, [str(here.parents[1]), os.environ.get("PYTHONPATH")]))
     done = subprocess.run(
         [sys.executable, "-c", code],
-        capture_output=True, text=True, timeout=100, check=True, cwd=Path(__file__).parent,
-        env={**os.environ, "PYTHONHASHSEED": "7"},
+        capture_output=True, text=True, timeout=100, check=True, cwd=here,
+        env={**os.environ, "PYTHONHASHSEED": "7", "PYTHONPATH": paths},
     )  # fmt: skip
     assert json.loads(done.stdout.splitlines()[-1]) == described()
     assert " at 0x" not in done.stdout

@@ -7,29 +7,13 @@ import pytest
 from pxr import Gf, Sdf, Vt
 
 import particlesim as ps
-from cases.ready import swept
-from particlesim.commands.scene_files import load_scene
+from cases.ready import small, swept
 from particlesim.output.usd.checking.check import check
 from particlesim.output.usd.checking.fault import Fault
 from particlesim.output.usd.info import info
 from particlesim.output.usd.pack import pack
 
 from .stages import COUNT, FRAMES, PLANT, build, vectors
-
-SMALL = {
-    "dam_break": {"spacing": 0.1},
-    "star_collision": {"count": 50},
-    "sod_tube": {"count": 90},
-    "sedov_blast": {"side": 10},
-    "plummer_sphere": {"count": 100},
-    "galaxy_collision": {"count": 100, "softening": 0.2},
-    "freezing": {"cells": 4},
-    "lj_melt": {"cells": 4},
-    "molten_salt": {"edge": 4, "tolerance": 1e-4},
-    "phase_transition": {"cells": 4},
-    "gas_in_a_box": {"count": 50},
-}
-
 
 Types = Sdf.ValueTypeNames
 
@@ -275,7 +259,7 @@ def test_a_range_that_leaves_frames_out(copy):
 
 @pytest.mark.parametrize("name", swept())
 def test_ready_scenes_have_no_faults(name, tmp_path):
-    module = load_scene(name)
-    sim = ps.Simulation(module.build(**SMALL.get(name, {})), module.settings, device="cpu")
+    module, scene = small(name)
+    sim = ps.Simulation(scene, module.settings, device="cpu")
     sim.run(2, record=tmp_path / "out.usda")
     assert check(tmp_path / "out.usda") == []

@@ -1,0 +1,1 @@
+"""Fluids beside each other, and the tension of their surfaces."""
