@@ -54,9 +54,15 @@ class ElasticSolid(Interaction):
     from four particles across it bends by 3 % too much, of which alpha = 0.1 makes 50 %.
 
     Bodies that are less than 2 h apart at the start are one; make a part for each. Bodies meet each
-    other, and fluids, by forces between pairs (``groups`` of :class:`PairPotential`), or by
-    :class:`Contact` of particles whose diameter is less than the spacing by as much as the solid
-    may be compressed. Pinned particles clamp it.
+    other by forces between pairs (``groups`` of :class:`PairPotential`), or by :class:`Contact` of
+    particles whose diameter is less than the spacing by as much as the solid may be compressed. A
+    liquid feels a body of its own spacing that it is together with in a :class:`SPH`,
+
+        SPH([water, solid], rest_density=[1000.0, 1200.0],
+            equation_of_state=[Tait(30.0), Tait(0.03)], smoothing_length=h)
+
+    where the solid's particles count in the liquid's density (as walls of Akinci 2012), and press
+    on each other a million times less than it. Pinned particles clamp a solid.
 
     Args:
         group: The solid's particles; None: all.
