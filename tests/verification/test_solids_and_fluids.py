@@ -8,17 +8,18 @@ import particlesim as ps
 Y, NU, DENSITY, GRAVITY = 3.5e6, 0.3, 1000.0, 9.81
 
 
-def wet(bar, water, spacing, depth, held=False, speed=0.0):
+def wet(bar, water, spacing, depth, held=False, speed=0.0, density=DENSITY, **options):
     """A scene of a solid and of water that is as deep, in the plane."""
-    scene, mass = ps.Scene(), DENSITY * spacing**2
-    solid = scene.add_particles(bar, mass=mass, pinned=held, group="solid")
-    water = scene.add_particles(water, mass=mass, velocity=(speed, 0, 0), group="water")
-    given = {"rest_density": DENSITY, "dimension": 2}
-    scene.add_interaction(ps.ElasticSolid(solid, Y, NU, smoothing_length=1.3 * spacing, **given))
+    scene, cell = ps.Scene(), spacing**2
+    solid = scene.add_particles(bar, mass=density * cell, pinned=held, group="solid")
+    v = (speed, 0, 0)
+    water = scene.add_particles(water, mass=DENSITY * cell, velocity=v, group="water")
+    given = {"rest_density": density, "smoothing_length": 1.3 * spacing, "dimension": 2}
+    scene.add_interaction(ps.ElasticSolid(solid, Y, NU, **given))
     sound = 10 * np.sqrt(GRAVITY * depth)
     states = [ps.Tait(sound), ps.Tait(1e-3 * sound)]  # a millionth of the water's pressure
-    both = {"smoothing_length": 1.6 * spacing, "equation_of_state": states, **given}
-    scene.add_interaction(ps.SPH([water, solid], **both))
+    given |= {"rest_density": [DENSITY, density], "smoothing_length": 1.6 * spacing}
+    scene.add_interaction(ps.SPH([water, solid], equation_of_state=states, **given, **options))
     return scene, solid, water
 
 
@@ -76,3 +77,32 @@ def test_a_plate_bends_under_water():
     x = sim.position[water.slice, 1]
     assert depth - 0.5 * spacing - x.max() < bent[1] + 0.5 * spacing + 0.005 * depth
     assert x.min() > -bent[1]  # and nothing has gone through
+
+
+@pytest.mark.slow
+def test_a_block_floats():
+    spacing, depth, width, height, part = 0.02, 0.4, 0.4, 0.2, 0.5
+    lower = np.array([0.5 - 0.5 * width, depth - part * height])
+    block = plane(lower, lower + np.array([width, height]), spacing)
+    water = plane((0, 0), (1, depth), spacing)
+    water = water[(np.abs(water[:, 0] - 0.5) > 0.5 * width) | (water[:, 1] < lower[1])]
+    scene, solid, water = wet(
+        block, water, spacing, 2 * depth, density=part * DENSITY,
+        viscosity=ps.ArtificialViscosity(0.2),
+    )  # fmt: skip
+    scene.add_interaction(ps.UniformGravity((0, -GRAVITY, 0)))
+    scene.add_constraint(ps.BoxBoundary((0, 0, -np.inf), (1, np.inf, np.inf), group=water))
+    sim = ps.Simulation(scene, ps.Settings(dt=0.02, substeps="auto"), device="cpu")
+    draught = []
+    for _ in range(150):
+        sim.step()
+        x = sim.position[water.slice]
+        columns = np.floor(x[:, 0] / spacing).astype(int)
+        beside = np.abs(x[:, 0] - 0.5) > 0.5 * width + 0.1
+        tops = [x[columns == each, 1].max() for each in np.unique(columns[beside])]
+        bottom = sim.position[solid.slice, 1].mean() - 0.5 * height
+        draught.append(np.mean(tops) + 0.5 * spacing - bottom)
+    # Archimedes, to half a spacing, which nobody knows better of a surface of particles.
+    assert np.mean(draught[-30:]) == pytest.approx(part * height, abs=0.5 * spacing)
+    tilt = np.polyfit(block[:, 0], sim.position[solid.slice, 1], 1)[0]
+    assert abs(tilt) < 0.01
