@@ -66,6 +66,7 @@ from .interactions.potentials.mie import LennardJones, Mie
 from .interactions.potentials.morse import Morse
 from .interactions.potentials.soft_sphere import SoftSphere
 from .interactions.potentials.yukawa import Yukawa
+from .interactions.solid.elastic_solid import ElasticSolid
 from .interactions.thermostats.cell_rescaling import CellRescaling
 from .interactions.thermostats.langevin import Langevin
 from .interactions.thermostats.velocity_rescaling import VelocityRescaling
@@ -106,6 +107,7 @@ __all__ = [
     "Dihedrals",
     "Distance",
     "Drag",
+    "ElasticSolid",
     "Electrostatics",
     "EquationOfState",
     "FENEBonds",

@@ -47,10 +47,10 @@ def build(
     )  # fmt: skip
     ball = ps.sample.sphere((0, 0, 0), radius, spacing)
     fall = height + 2.3 * radius * drops
-    rain = [
-        ball + [*rng.uniform(-0.1, 0.1, 1) * side, height + radius * (1 + 2.3 * k), 0]
-        for k in range(drops)
-    ]
+    rain = []
+    for k in range(drops):
+        aside, up = 0.1 * side * rng.uniform(-1, 1), height + radius * (1 + 2.3 * k)
+        rain.append(ball + np.array([aside, up, 0.0]))
     water = scene.add_particles(
         np.concatenate(rain), mass=WATER * spacing**3, radius=0.4 * spacing, group="water"
     )

@@ -94,6 +94,9 @@ QUANTITIES = {
     "constant": Quantity(0.6, (3, 1, -2)),
     "modulus": Quantity(40.0, (-1, 1, -2)),
     "ratio": Quantity(0.3),
+    "youngs_modulus": Quantity(40.0, (-1, 1, -2)),
+    "poissons_ratio": Quantity(0.3),
+    "hourglass": Quantity(0.5),
     "dissipation": Quantity(0.02, (0, 0, 1)),
     "sliding": Quantity(0.05, (0, 0, 1)),
     "depth": Quantity(0.8, (2, 1, -2)),
@@ -126,6 +129,7 @@ LEFT_OUT = {"break_force", "inequality", "tension_only", "truncation", "inside",
             ("Electrostatics", "damping"), ("Gravity", "cutoff")}  # fmt: skip
 # What is of one machinery is tried by its kin in every run, and itself in the long one.
 KIN = {
+    "ElasticSolid": "Springs",
     "HarmonicBonds": "Springs", "FENEBonds": "Bonds", "HarmonicAngles": "Angles",
     "Mie": "LennardJones", "Yukawa": "PairPotential", "Morse": "PairPotential",
     "SoftSphere": "PairPotential", "Coulomb": "PairPotential", "Electrostatics": "PairPotential",

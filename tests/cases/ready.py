@@ -7,6 +7,7 @@ from particlesim.commands.scene_files import load_scene, ready_scenes
 # Options that make scenes small; the others are.
 SMALL = {
     "dam_break": {"spacing": 0.05},
+    "elastic_rings": {"spacing": 0.25},
     "elliptical_drop": {"across": 20},
     "floating_block": {"spacing": 0.05},
     "freezing": {"cells": 5},
@@ -29,12 +30,12 @@ SMALL = {
 }
 
 # What others stand for in every run: sod_tube for gases with heat, dam_break for SPH with walls,
-# plummer_sphere for gravity, lj_melt for liquids, pile for contacts; these themselves are swept in
-# the long one.
+# plummer_sphere for gravity, lj_melt for liquids, pile for contacts, spring_lattice for solids;
+# these themselves are swept in the long one.
 LONG = {
-    "elliptical_drop", "floating_block", "freezing", "galaxy_collision", "molten_salt",
-    "phase_transition", "poiseuille", "polymer_melt", "polytrope", "rain_on_cloth", "sedov_blast",
-    "standing_wave", "star_collision", "taylor_green", "toy_star",
+    "elastic_rings", "elliptical_drop", "floating_block", "freezing", "galaxy_collision",
+    "molten_salt", "phase_transition", "poiseuille", "polymer_melt", "polytrope", "rain_on_cloth",
+    "sedov_blast", "standing_wave", "star_collision", "taylor_green", "toy_star",
 }  # fmt: skip
 
 

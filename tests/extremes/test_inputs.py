@@ -55,6 +55,10 @@ PARTS = {
                   "break_force": 10.0},
     ps.Drag: {"linear": 1.0, "quadratic": 1.0, "flow": (1, 0, 0)},
     ps.Electrostatics: {"method": "particle_mesh_ewald", "cutoff": 2.0, "tolerance": 1e-5},
+    ps.ElasticSolid: {
+        "group": "g", "youngs_modulus": 1.0, "poissons_ratio": 0.3, "smoothing_length": 0.1,
+        "rest_density": 1.0, "hourglass": 1.0, "dissipation": 0.1,
+    },
     ps.FENEBonds: {"pairs": [(0, 1)], "stiffness": 30.0, "length": 1.5},
     ps.Gravity: {"G": 1.0, "softening": 0.1, "method": "particle_mesh_ewald", "cutoff": 2.0,
                  "tolerance": 1e-5},

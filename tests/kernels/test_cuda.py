@@ -134,6 +134,7 @@ def damped():
     scene = particles()
     scene.add_interaction(ps.Springs([(0, 1)], 1.0, 1.0, damping=1.0))
     scene.add_interaction(ps.Drag(1.0))
+    scene.add_interaction(ps.ElasticSolid(None, 1.0, 0.3, smoothing_length=2.0, dissipation=1.0))
     return scene
 
 
@@ -178,8 +179,7 @@ def attracted(s, **attributes):
 
 
 BELT = ps.PlaneBoundary((0, -9, 0), (0, 1, 0), velocity=(1, 0, 0), slip=False)
-BOX, XSPH = ((0, 0, 0), (10, 10, 10)), ps.XSPH()
-VERLET = {"integrator": "velocity_verlet"}
+BOX, XSPH, VERLET = ((0, 0, 0), (10, 10, 10)), ps.XSPH(), {"integrator": "velocity_verlet"}
 SCENES = {
     "gas": (lambda: particles(), {}),
     "uncompensated_gas": (lambda: particles(), {"compensated": False}),

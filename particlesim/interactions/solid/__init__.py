@@ -1,0 +1,1 @@
+"""Solids that keep their shape."""
