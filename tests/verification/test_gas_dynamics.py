@@ -228,3 +228,50 @@ def test_toy_star(dimension, count, rms):
     r, density = np.linalg.norm(sim.position, axis=1), sim.get("density")
     error = density[r < 0.8] / (1 - r[r < 0.8] ** 2) - 1
     assert np.sqrt(np.mean(error**2)) < rms
+
+
+# Vortices -----------------------------------------------------------------------------------------
+
+
+def gresho(count):
+    """Mean error of the velocity around the middle, at t = 1, in the vortex of Gresho and Chan.
+
+    v = 5 r to r = 0.2, 2 - 5 r to 0.4, then 0; density 1, and the pressure that holds it steady.
+    """
+    spacing = 1 / count
+    x = ps.sample.box((-0.5, -0.5, 0), (0.5, 0.5, 0), spacing)
+
+    def around(x):
+        r = np.hypot(x[:, 0], x[:, 1])
+        return r, np.stack([-x[:, 1], x[:, 0], 0 * r], axis=1) / r[:, None]
+
+    def speed(r):
+        return np.select([r < 0.2, r < 0.4], [5 * r, 2 - 5 * r], 0.0)
+
+    r, along = around(x)
+    middle = 9 + 12.5 * r**2 - 20 * r + 4 * np.log(5 * r)
+    pressure = np.select([r < 0.2, r < 0.4], [5 + 12.5 * r**2, middle], 3 + 4 * np.log(2))
+    scene = ps.Scene(periodic=((-0.5, -0.5, None), (0.5, 0.5, None)))
+    scene.add_particles(
+        x, velocity=speed(r)[:, None] * along, mass=spacing**2, internal_energy=1.5 * pressure
+    )
+    h = 3 * spacing
+    scene.add_interaction(
+        ps.SPH(smoothing_length=h, equation_of_state=ps.IdealGas(5 / 3), smoothing="wendland_c6",
+               dimension=2, viscosity=ps.ArtificialViscosity(0.2, 0.4, balsara=True))
+    )  # fmt: skip
+    substeps = int(np.ceil(0.1 / (0.3 * h / np.sqrt(5 / 3 * 5.8))))
+    settings = ps.Settings(dt=0.1, substeps=substeps, integrator="velocity_verlet")
+    sim = ps.Simulation(scene, settings, device="cpu")
+    sim.run(10)
+    r, along = around(sim.position)
+    error = np.abs((sim.velocity * along).sum(axis=1) - speed(r))
+    return float(error[r < 0.5].mean())
+
+
+@pytest.mark.slow
+def test_gresho_vortex():
+    """Converges as SPH is known to, between N^-0.7 and N^-1 along a side (Dehnen and Aly 2012)."""
+    errors = [gresho(count) for count in (40, 80, 160)]
+    slopes = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert (slopes > 0.7).all() and errors[-1] < 0.02
