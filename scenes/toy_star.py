@@ -10,7 +10,7 @@ import warp as wp
 
 import particlesim as ps
 
-frames = 63
+frames = 99
 settings = ps.Settings(dt=0.05, substeps=4, integrator="velocity_verlet")
 
 

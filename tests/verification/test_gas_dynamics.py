@@ -271,7 +271,7 @@ def gresho(count):
 
 @pytest.mark.slow
 def test_gresho_vortex():
-    """Converges as SPH is known to, between N^-0.7 and N^-1 along a side (Dehnen and Aly 2012)."""
+    """Converges, by less than the order of its sums, as it is known to (Dehnen and Aly 2012)."""
     errors = [gresho(count) for count in (40, 80, 160)]
     slopes = np.log2(np.array(errors[:-1]) / errors[1:])
     assert (slopes > 0.7).all() and errors[-1] < 0.02
