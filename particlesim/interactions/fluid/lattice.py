@@ -39,15 +39,16 @@ def lattice_sum(smoothing: Smoothing, dimension: int, ratio: float) -> float:
 
 
 def spacings(fluid: Any, model: Model) -> np.ndarray:
-    """Of the lattice that particles of their mean mass make at the rest density, by world.
+    """Of the lattice that their lightest particles make at the rest density, by world.
 
+    Others are heavier where a start has them under the weight of what is above.
     (m / rho_0)^(1/d) [length]; 0 where the fluid has no rest density, or no particles.
     """
     found, mass = np.zeros(model.world_count), model.column("mass")
     for w, peer in enumerate(fluid.peers):
         rows = fluid.pairs.members_host[fluid.pairs.begin_host[w] : fluid.pairs.end_host[w]]
         if len(rows) and "rest_density" in peer.parameters:
-            volume = mass[rows].mean() / peer.parameters["rest_density"]
+            volume = mass[rows].min() / peer.parameters["rest_density"]
             found[w] = volume ** (1.0 / fluid.dimension)
     return found
 
