@@ -13,12 +13,11 @@ from ..scene.scene import Scene
 from .fluid.equations_of_state import Tait
 from .fluid.smoothing import SmoothingFunction
 from .fluid.sph import SPH
+from .fluid.starts import STIFF, gravity
 from .fluid.viscosities import ArtificialViscosity, Viscosity
-from .particle import UniformGravity
 
 OWNER = "Scene.add_fluid"
 REACH = 1.3  # h in spacings
-STIFF = 10.0  # sound over the largest speed
 VISCOSITY = ArtificialViscosity(0.05)
 
 
@@ -32,7 +31,7 @@ def fill(
     s = validate.number(OWNER, "spacing", spacing, above=0.0, unit="length")
     rho_0 = validate.number(OWNER, "rest_density", rest_density, above=0.0, unit="mass/length^d")
     x = _points(shape, s)
-    g = _gravity(scene)
+    g = gravity(scene)
     pull = float(np.linalg.norm(g))
     # A particle stands for a cell about it: the surface is half a spacing above the highest.
     height = -(x @ g) / pull if pull > 0 else np.zeros(len(x))
@@ -86,9 +85,3 @@ def _points(shape: Any, spacing: float) -> np.ndarray:
     """The points given, or those that fill the box of two corners."""
     x = validate.rows(OWNER, "shape", shape, None, 3)
     return sample.box(x[0], x[1], spacing) if len(x) == 2 else x
-
-
-def _gravity(scene: Scene) -> np.ndarray:
-    """Of all that is in the scene, (3,)."""
-    fields = [each for each in scene.interactions if isinstance(each, UniformGravity)]
-    return np.sum([each.parameters["acceleration"] for each in fields] or [np.zeros(3)], axis=0)
