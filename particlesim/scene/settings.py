@@ -118,7 +118,8 @@ class Settings:
                 owner, "relaxation", self.relaxation, above=0.0, maximum=1.0
             ),
         }
-        chosen = ["dt"] * (self.dt == AUTO) + ["substeps"] * _is_open(self.substeps)
+        left_open = {"dt": _is(self.dt, AUTO), "substeps": _is(self.substeps, AUTO, ADAPTIVE)}
+        chosen = [name for name, is_open in left_open.items() if is_open]
         if len(chosen) == 2:
             raise validate.fail(
                 owner,
@@ -135,7 +136,7 @@ class Settings:
             least = checked.get("substeps", 1)
             most = validate.whole(owner, "most_substeps", self.most_substeps, minimum=least)
             checked["most_substeps"] = most
-        elif self.substeps == ADAPTIVE:
+        elif _is(self.substeps, ADAPTIVE):
             checked["most_substeps"] = MOST
         if not isinstance(self.integrator, type):
             validate.choice(owner, "integrator", self.integrator, INTEGRATORS)
@@ -164,7 +165,7 @@ class Settings:
     @property
     def automatic(self) -> bool:
         """Whether dt or substeps are yet to be chosen, by the simulation."""
-        return self.dt == AUTO or _is_open(self.substeps)
+        return _is(self.dt, AUTO) or _is(self.substeps, AUTO, ADAPTIVE)
 
     @property
     def adaptive(self) -> bool:
@@ -190,5 +191,5 @@ class Settings:
         return dataclasses.replace(self, **knobs)
 
 
-def _is_open(value: Any) -> bool:
-    return isinstance(value, str) and value in (AUTO, ADAPTIVE)
+def _is(value: Any, *words: str) -> bool:
+    return isinstance(value, str) and value in words

@@ -146,7 +146,7 @@ def _densities(fluid: Any) -> np.ndarray:
 def _of_speed(fluid: Any, members: np.ndarray, columns: dict[str, np.ndarray]) -> str:
     """A liquid is to be slower than its sound by far; what drifts as a whole is not fast.
 
-    It will be as fast as what falls from its surface to its bottom.
+    Where it is held it will be as fast as what falls from its surface to its bottom.
     """
     if not isinstance(fluid.equation_of_state, Tait):
         return ""
@@ -173,6 +173,8 @@ def _falls(fluid: Any, members: np.ndarray) -> np.ndarray:
     """sqrt(2 g H) of each world's fluid, H how deep it lies along gravity [length/time]."""
     model, x = fluid.model, fluid.state.position.numpy().astype(np.float64)[members]
     found = np.zeros(model.world_count)
+    if not (fluid.walls or model.column("pinned")[members].any()):
+        return found  # it falls as a whole
     for w, scene in enumerate(model.scenes):
         own = x[model.world_of[members] == w] @ gravity(scene)  # g times the depth
         found[w] = np.sqrt(2.0 * np.ptp(own)) if len(own) else 0.0
