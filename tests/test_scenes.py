@@ -14,6 +14,7 @@ from particlesim.commands.scene_files import ready_scenes
 NAMES = list(ready_scenes())
 SMALL = {
     "dam_break": {"spacing": 0.05},
+    "hydrostatic_tank": {"spacing": 0.1},
     "star_collision": {"count": 150},
     "sod_tube": {"count": 90},
     "sedov_blast": {"side": 10},
@@ -38,7 +39,8 @@ def simulate(name, frames, device, settings=None, **options):
 
 def test_the_ready_scenes_are_all_there():
     expected = (
-        "bouncing_block chain dam_break freezing galaxy_collision gas_in_a_box lj_melt "
+        "bouncing_block chain dam_break freezing galaxy_collision gas_in_a_box hydrostatic_tank "
+        "lj_melt "
         "molten_salt phase_transition pile plummer_sphere polymer_melt sedov_blast sod_tube "
         "spring_lattice "
         "star_collision three_body triple_pendulum wave_field"
@@ -67,6 +69,19 @@ def test_dam_break_front_follows_the_experiment(device):
     # has to be within 6 %: half a drop's spacing is 5 % of the column's width, 2 % of the way.
     module, sim = simulate("dam_break", 25, device)
     assert module.error(sim) < 0.06
+
+
+@pytest.mark.parametrize("spacing", [0.1, pytest.param(0.05, marks=pytest.mark.slow)])
+def test_the_floor_of_a_tank_bears_its_weight(spacing, device):
+    module, sim = simulate("hydrostatic_tank", 30, device, spacing=spacing)
+    pressure = []
+    for _ in range(30):  # over many periods of the sound that is left, 4 h / c = 0.09 s
+        sim.step()
+        pressure.append(module.floor_pressure(sim))
+        # That sound: what the last two rows fall by makes some percent of the pressure.
+        assert module.error(sim) < 0.1
+    # What pressures of a tank at rest are to be within (issue 14): a fifth of a spacing of 0.1.
+    assert np.mean(pressure) == pytest.approx(1.0, abs=0.02)
 
 
 def test_stars_keep_momentum_and_energy(device):

@@ -5,10 +5,10 @@ import pytest
 from particlesim.commands.scene_files import ready_scenes
 
 # What others stand for in every run: sod_tube for gases with heat, plummer_sphere for gravity,
-# lj_melt for liquids, pile for contacts; these themselves are swept in the long one.
+# lj_melt and dam_break for liquids, pile for contacts; these themselves are swept in the long one.
 LONG = {
-    "galaxy_collision", "molten_salt", "phase_transition", "polymer_melt", "sedov_blast",
-    "star_collision",
+    "galaxy_collision", "hydrostatic_tank", "molten_salt", "phase_transition", "polymer_melt",
+    "sedov_blast", "star_collision",
 }  # fmt: skip
 
 
