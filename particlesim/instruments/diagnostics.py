@@ -91,6 +91,9 @@ class Diagnostics(Report):
         for name in ("momentum", "angular_momentum"):
             heads.append((name.replace("_", " "), "left"))
             columns.append([" ".join(f"{x:.5g}" for x in row) for row in getattr(self, name)])
+        if self.limiter.any():
+            heads += [("substeps", "right"), ("limited by", "left")]
+            columns += [[str(n) for n in self.substeps], self.limiter.tolist()]
         rows = list(zip(*columns, strict=True))
         more = [f"and {len(rows) - SHOWN} more worlds"] if len(rows) > SHOWN else []
         return "\n".join([*grid(heads, rows[:SHOWN]), *more])

@@ -26,16 +26,17 @@ class Settings:
             ``substeps`` times what ``safety`` says, and has that number in its own ``settings``.
         safety: Part of the largest safe substep, ``stability().dt`` at the start, that ``"auto"``
             takes, above 0, at most 1. None: 0.5, or less where the energy would not stay within a
-            tenth of itself on the path that ``stability()`` looks ahead on.
+            tenth of itself on the path that ``stability()`` looks ahead on. Adaptive substeps take
+            0.5, which is stable; orbits keep their energy by a tenth of that.
         substeps: Substeps a frame; each advances by ``dt / substeps``. ``"auto"``: as many as make
             a substep at most what ``safety`` says. ``"adaptive"``: so for every frame, by the
             limits at its start; a frame that ends past them is done again with more. What begins
             and ends within one frame goes unseen: let frames be shorter than that. The simulation
             has the number of the last frame in its own ``settings``, and says in
             ``diagnostics()`` what limited it. All worlds of a batch have as many.
-        most_substeps: Where a number is given, substeps are adaptive, from ``substeps`` on, and at
-            most so many, rounded up to one of 1, 2, 3, 4, 6, 8, 12, 16, 23 ... A run that wants
-            more warns of what does. ``"adaptive"`` alone: 10 000.
+        most_substeps: Where a number is given, substeps are adaptive, whatever ``substeps`` is:
+            one of 1, 2, 3, 4, 6, 8, 12, 16, 23 ..., each by sqrt(2) the last, or so many at most. A
+            run that wants more warns of what does. None: with ``"adaptive"`` 10 000.
         iterations: Sweeps over the constraints a substep (XPBD). Compliant constraints do not
             depend on it; stiff ones come closer to C = 0.
         integrator: ``"symplectic_euler"`` (first order, any scene); ``"velocity_verlet"`` (second
