@@ -72,12 +72,11 @@ def test_bits(quiet, tmp_path):
     assert loaded.settings.adaptive and loaded.diagnostics().limiter[0]
     loaded.run(3)
     other.reset()
-    again = [other.settings.substeps]
     other.run(6)
     for sim in (other, loaded):
         np.testing.assert_array_equal(sim.position, straight.position)
         np.testing.assert_array_equal(sim.velocity, straight.velocity)
-        assert sim.settings.substeps == straight.settings.substeps == again[0]
+        assert sim.settings.substeps == straight.settings.substeps
         assert sim.limiter == straight.limiter
 
 
@@ -125,6 +124,7 @@ def test_an_eccentric_orbit_is_followed_better_at_equal_cost():
     assert adaptive.max() < 0.1
 
 
+@pytest.mark.slow
 def test_a_hot_start_pays_for_its_first_frames_only():
     side, rng = 8.0, np.random.default_rng(0)
     scene = ps.Scene(periodic=((0, 0, 0), (side, side, side)))
@@ -163,14 +163,13 @@ def test_nothing_limits_what_flies_freely():
 
 
 def test_worlds_of_a_batch_have_as_many():
-    """As those of the world that asks for most."""
+    """As many as all of them can do with."""
     scenes = [splash(speed) for speed in (1.0, 10.0)]
     sim = ps.Simulation(scenes, ADAPTIVE, device="cpu")
-    sim.run(2)
-    alone = ps.Simulation(scenes[1], ADAPTIVE, device="cpu")
-    alone.run(2)
-    np.testing.assert_array_equal(sim.world(1).position, alone.position)
-    assert sim.diagnostics().substeps.tolist() == [alone.settings.substeps] * 2
+    for _ in range(3):
+        sim.step()
+        assert sim.stability().substeps <= sim.settings.substeps
+        assert sim.diagnostics().substeps.tolist() == [sim.settings.substeps] * 2
 
 
 @pytest.mark.slow
