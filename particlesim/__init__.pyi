@@ -66,6 +66,7 @@ from .interactions.potentials.mie import LennardJones, Mie
 from .interactions.potentials.morse import Morse
 from .interactions.potentials.soft_sphere import SoftSphere
 from .interactions.potentials.yukawa import Yukawa
+from .interactions.scene import Scene
 from .interactions.solid.elastic_solid import ElasticSolid
 from .interactions.thermostats.cell_rescaling import CellRescaling
 from .interactions.thermostats.langevin import Langevin
@@ -79,7 +80,6 @@ from .scene.constraint_base import ConstraintBase
 from .scene.group import Group
 from .scene.law import Law, law
 from .scene.part import Interaction
-from .scene.scene import Scene
 from .scene.settings import Settings
 from .scene.table import Table
 from .scene.thermostat import Barostat, Thermostat

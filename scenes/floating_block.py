@@ -15,6 +15,7 @@ settings = ps.Settings(dt=1 / 60, substeps=48, iterations=4)
 GRAVITY, WATER = 9.81, 1000.0  # [m/s^2], [kg/m^3]
 WIDTH, HEIGHT = 0.4, 0.2  # of the block [m]
 TANK, DEPTH = 1.2, 0.4  # the tank's width, and the water's depth without the block [m]
+SOUND = 35.0  # speed of sound [m/s]
 
 
 def build(spacing: float = 0.02, density: float = 500.0, lifted: float = 0.02) -> ps.Scene:
@@ -41,13 +42,12 @@ def build(spacing: float = 0.02, density: float = 500.0, lifted: float = 0.02) -
         color=(0.6, 0.4, 0.2),
     )  # fmt: skip
     scene.add_interaction(ps.UniformGravity((0, -GRAVITY, 0)))
-    sound = 10 * (2 * GRAVITY * DEPTH) ** 0.5
     scene.add_interaction(
         ps.SPH(
             [water, wood],
             smoothing_length=1.6 * spacing,
             rest_density=[WATER, density],
-            equation_of_state=ps.Tait(sound),
+            equation_of_state=ps.Tait(SOUND),
             viscosity=ps.ArtificialViscosity(0.1),
             dimension=2,
         )

@@ -10,10 +10,10 @@ import numpy as np
 import particlesim as ps
 
 GRAVITY, DEPTH = 9.81, 1.0
-DENSITY, SOUND = 1000.0, 30.0  # at rest [kg/m^3], [m/s]
+DENSITY, SOUND = 1000.0, 45.0  # at rest [kg/m^3], [m/s]
 
 frames = 60
-settings = ps.Settings(dt=0.02, substeps=50)
+settings = ps.Settings(dt=0.02, substeps=75)
 
 
 def build(length: float = 1.0, spacing: float = 1 / 48, speed: float = 0.2) -> ps.Scene:

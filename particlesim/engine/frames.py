@@ -75,6 +75,11 @@ class Frames:
             self.executor(substeps).run()
         self.loop.unknown_forces.clear()
 
+    def back(self) -> None:
+        """To the start of the last frame."""
+        self.snapshot.restore()
+        self.guard.forget()
+
     def place_on_constraints(self, iterations: int) -> None:
         """See :meth:`Loop.place_on_constraints`; again where a row of neighbours was full."""
         self.snapshot.take()
@@ -104,8 +109,7 @@ class Frames:
     def _restart(self) -> None:
         """Make room in the rows that were full, and go back to the start of the frame."""
         self.loop.neighbors.lengthen()
-        self.snapshot.restore()
-        self.guard.forget()
+        self.back()
 
     def _new(self, substeps: int, peak: wp.array | None = None) -> Runner:
         frame = self._record(substeps, peak)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from numpy.polynomial import Polynomial
 
@@ -35,6 +36,30 @@ class Limit:
         if self.particle is None:
             return ""
         return f"particle {self.particle}" + (f" in world {self.world}" if self.world else "")
+
+
+@dataclass
+class Pacing:
+    """What the substeps of adaptive frames were chosen by, as it goes on with the run.
+
+    Args:
+        limit: The tightest when limits were last asked; None: never, or at a state that is no more.
+        sizes: Largest speed, acceleration and density then; none: not known.
+        limiter: That by which the last frame has its number.
+    """
+
+    limit: Limit | None = None
+    sizes: tuple[float, ...] = ()
+    limiter: Limit | None = None
+
+    @classmethod
+    def of_saved(cls, saved: dict[str, Any]) -> Pacing:
+        """Of a checkpoint's header."""
+        limits = {
+            name: None if saved[name] is None else Limit(**saved[name])
+            for name in ("limit", "limiter")
+        }
+        return cls(sizes=tuple(saved["sizes"]), **limits)
 
 
 def explicit_step(omega_squared: float, gamma: float = 0.0) -> float:

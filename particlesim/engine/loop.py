@@ -20,6 +20,7 @@ from ..scene.thermostat import Barostat, Thermostat
 from .execution.acting import act
 from .execution.launch import owner
 from .integrators import Integrator, method
+from .limit import Limit, Pacing
 from .model import Model
 from .neighbors.lists import Neighbors
 from .observers import EXCHANGE, FINISH, FOLLOW, FORCE, PROJECT, Observers
@@ -47,7 +48,7 @@ class Loop:
         self.settings = settings
         self.laws = laws_of(scenes[0])  # as they are read now
         self.model = model = Model(scenes, settings, device)
-        self.frame = 0
+        self.frame, self.pacing = 0, Pacing()
         self._distinct = list({id(scene): scene for scene in scenes}.values())
         self._changes = self._counted()
         # What is prepared allocates only what it requires.
@@ -195,6 +196,14 @@ class Loop:
             each.assign(force)
         self.unknown_forces.clear()
 
+    def divide(self, substeps: int) -> None:
+        """Frames are of so many substeps from now on."""
+        if substeps == self.settings.substeps:
+            return
+        self.settings = self.model.settings = self.settings.replace(substeps=substeps)
+        if any(part.carried() for part in self.interactions):  # which was for another substep
+            self.unknown_forces.update(range(self.model.world_count))
+
     def place_on_constraints(self, iterations: int) -> None:
         """Move positions onto the constraints, rigidly and without giving velocity."""
         if "previous_position" in self.state:
@@ -236,6 +245,11 @@ class Loop:
             owner, "part", "belong to a scene of this simulation", part,
             f"name one of its own ({names})",
         )  # fmt: skip
+
+    @property
+    def limiter(self) -> Limit | None:
+        """What the number of substeps was chosen by, where it is adaptive."""
+        return self.pacing.limiter
 
     @property
     def time(self) -> float:

@@ -11,6 +11,7 @@ from ..scene.constraint_base import ConstraintBase
 from ..scene.part import Interaction
 from ..scene.scene import Scene
 from ..scene.settings import Settings
+from .limit import Limit
 from .model import Model
 from .neighbors.lists import Neighbors
 from .state import State
@@ -20,12 +21,19 @@ class Source(Protocol):
     """What recorders, histories and pictures read: a simulation has it, and so has its loop."""
 
     scenes: Sequence[Scene]  # one for each world
-    settings: Settings
     model: Model
     state: State
     neighbors: Neighbors
     interactions: Sequence[Interaction]  # of all worlds, bound
     constraints: Sequence[ConstraintBase]
+
+    @property
+    def settings(self) -> Settings:
+        """The knobs, with numbers for all."""
+
+    @property
+    def limiter(self) -> Limit | None:
+        """What the number of substeps was chosen by, where it is adaptive."""
 
     @property
     def frame(self) -> int:

@@ -40,6 +40,10 @@ class Diagnostics(Report):
     minus the stress of solids, symmetric, (worlds, 3, 3) [energy/length^3]. It is not a number
     where an axis is open, or where something gives its virial as one number: a fluid, a tree,
     an Ewald sum, contacts.
+
+    ``substeps`` are those of the last frame, and ``limiter`` are the part and the kind of limit
+    that they were chosen by, in words, (worlds,), the same for all worlds of a batch; no words
+    where they are not adaptive.
     """
 
     mass: np.ndarray
@@ -51,6 +55,8 @@ class Diagnostics(Report):
     free: np.ndarray
     volume: np.ndarray
     stress: np.ndarray
+    substeps: np.ndarray
+    limiter: np.ndarray
 
     @property
     def energy(self) -> np.ndarray:
@@ -85,6 +91,9 @@ class Diagnostics(Report):
         for name in ("momentum", "angular_momentum"):
             heads.append((name.replace("_", " "), "left"))
             columns.append([" ".join(f"{x:.5g}" for x in row) for row in getattr(self, name)])
+        if self.limiter.any():
+            heads += [("substeps", "right"), ("limited by", "left")]
+            columns += [[str(n) for n in self.substeps], self.limiter.tolist()]
         rows = list(zip(*columns, strict=True))
         more = [f"and {len(rows) - SHOWN} more worlds"] if len(rows) > SHOWN else []
         return "\n".join([*grid(heads, rows[:SHOWN]), *more])
@@ -169,10 +178,12 @@ def _measure(sim: Source, forces: Source, potentials: list[np.ndarray] | None) -
     free = np.bincount(model.world_of, model.column("pinned") == 0, model.world_count)
     length = model.box_length
     volume = np.where((length > 0).all(axis=1), length.prod(axis=1), np.nan)
+    limiter = f"{sim.limiter.part} {sim.limiter.kind}".strip() if sim.limiter else ""
     known = np.where(total[:, 10] == 0.0, volume, np.nan)[:, None, None]
     return Diagnostics(
         total[:, 0], total[:, 1:4], total[:, 4:7], total[:, 7], total[:, 8], total[:, 9], free,
         volume, matrices(total[:, 11:]) / known,
+        np.full(model.world_count, sim.settings.substeps), np.full(model.world_count, limiter),
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from .. import validate
 from ..constraints.constraint import Constraint
 from ..engine.limit import Limit
 from ..engine.loop import Loop
-from ..engine.probe import Probe
+from ..engine.probe import STEPS, Probe
 from ..engine.rates.rates import Rates
 from ..engine.report import Report, grid
 from ..interactions.fusion import fuse
@@ -113,7 +113,7 @@ def stability(loop: Loop, share: float = 1.0) -> Stability:
 
 def _foreseen(loop: Loop, share: float = 1.0) -> tuple[list[Limit], Ahead]:
     """The limits now and ahead, and what else there is on that path."""
-    limits = _limits_now(loop)
+    limits = limits_now(loop)
     ahead = look_ahead(loop, limits, share)
     return limits + ([] if ahead.limit is None else [ahead.limit]), ahead
 
@@ -123,11 +123,14 @@ def _in_order(limits: list[Limit]) -> list[Limit]:
 
 
 @np.errstate(all="ignore")
-def _limits_now(loop: Loop, quick: bool = False) -> list[Limit]:
-    """Those of the present; ``quick``: what the settings surely keep may be smaller than it is."""
+def limits_now(loop: Loop, quick: bool = False, steps: int = STEPS) -> list[Limit]:
+    """Those of the present; ``quick``: what the settings surely keep may be smaller than it is.
+
+    ``steps``: as of :class:`~particlesim.engine.probe.Probe`.
+    """
     limits: list[Limit] = []
     if loop.model.particle_count:
-        with Probe(loop, quick) as probe:
+        with Probe(loop, quick, steps) as probe:
             for part in [*loop.interactions, *loop.constraints]:
                 limits += part.limits(probe)
             limits += _together(probe, limits)
@@ -162,7 +165,9 @@ def warn_if_past(loop: Loop, again: bool = False) -> None:
         for said in (misfit(loop), *(part.complaint() for part in loop.parts)):
             if said:
                 warnings.warn(said, StabilityWarning, stacklevel=3)
-    report = Stability(_in_order(_limits_now(loop, quick=True)), loop.settings)
+    if loop.settings.adaptive:  # whose pace tells
+        return
+    report = Stability(_in_order(limits_now(loop, quick=True)), loop.settings)
     if not report.safe or not again:
         report = stability(loop, GLANCE)
     if again:  # what slow collisions gain is told by the energy, and is no danger

@@ -21,6 +21,7 @@ import numpy as np
 
 from .. import validate
 from ..engine.frames import Frames
+from ..engine.limit import Pacing
 from ..engine.model import batch
 from ..instruments.watchdog.incident import Incident
 from ..instruments.watchdog.watch import Watchdog
@@ -85,6 +86,7 @@ def capture(
         "frozen": sorted(watchdog.frozen),
         "incidents": [dataclasses.asdict(incident) for incident in watchdog.incidents],
         "settings": loop.settings.plain,
+        "pacing": dataclasses.asdict(loop.pacing),
         "copies": all(scene is loop.scenes[0] for scene in loop.scenes),
         "scenes": fingerprint(loop.scenes, loop.laws) if scenes is None else scenes,
         "arrays": list(arrays),
@@ -101,6 +103,10 @@ def restore(frames: Frames, watchdog: Watchdog, saved: Saved) -> None:
     loop = frames.loop
     _fill(frames, saved)
     loop.frame = saved.header["frame"]
+    if loop.settings.adaptive:
+        loop.divide(saved.header["settings"]["substeps"])
+    if "pacing" in saved.header:
+        loop.pacing = Pacing.of_saved(saved.header["pacing"])
     loop.unknown_forces = set(saved.header["unknown_forces"])
     watchdog.incidents = [Incident.of_saved(each) for each in saved.header.get("incidents", ())]
     watchdog.resume(frames, saved.header.get("frozen", ()))

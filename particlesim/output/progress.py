@@ -30,13 +30,14 @@ class Meter:
     def measure(self, label: str, sim: Any, frames: int) -> Iterator[Callable[[int, int], None]]:
         """Show a bar while the simulation runs; yields what it calls after every frame."""
         self.label, self.frames, self.particles = label, frames, sim.particle_count
-        self.work = self.particles * sim.settings.substeps
         self.started = time.perf_counter()
         count = f"{self.particles:,} particles"
         with bar(label, "frames", frames, count) as show:
 
             def after_frame(frame: int, frames: int) -> None:
                 self.done += 1
+                work = self.particles * sim.settings.substeps
+                self.work = work if self.done <= 2 else self.work + work  # as of rate()
                 self.last = time.perf_counter()
                 self.first = self.first or self.last
                 show(frame, frames, detail=f"{count}, {self.rate()}")
@@ -62,8 +63,8 @@ class Meter:
 
     def rate(self) -> str:
         """Particle-substeps a second; without the first frame, if there are others: it compiles."""
-        frames, since = (self.done - 1, self.first) if self.done > 1 else (1, self.started)
-        rate = frames * self.work / max(self.last - since, 1e-9)
+        since = self.first if self.done > 1 else self.started
+        rate = self.work / max(self.last - since, 1e-9)
         for limit, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
             if rate >= limit:
                 return f"{rate / limit:.3g} {prefix} particle-substeps/s"

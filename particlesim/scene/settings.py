@@ -13,6 +13,8 @@ PRECISIONS = ("float32", "float64")
 EXECUTIONS = ("auto", "graph", "threads")
 ON_FAILURE = ("stop", "retry", "freeze")
 AUTO = "auto"  # a dt or substeps that a simulation chooses when it is made
+ADAPTIVE = "adaptive"  # substeps that it chooses anew for every frame
+MOST = 10_000  # of them
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,9 +26,17 @@ class Settings:
             ``substeps`` times what ``safety`` says, and has that number in its own ``settings``.
         safety: Part of the largest safe substep, ``stability().dt`` at the start, that ``"auto"``
             takes, above 0, at most 1. None: 0.5, or less where the energy would not stay within a
-            tenth of itself on the path that ``stability()`` looks ahead on.
+            tenth of itself on the path that ``stability()`` looks ahead on. Adaptive substeps take
+            0.5, which is stable; orbits keep their energy by a tenth of that.
         substeps: Substeps a frame; each advances by ``dt / substeps``. ``"auto"``: as many as make
-            a substep at most what ``safety`` says.
+            a substep at most what ``safety`` says. ``"adaptive"``: so for every frame, by the
+            limits at its start; a frame that ends past them is done again with more. What begins
+            and ends within one frame goes unseen: let frames be shorter than that. The simulation
+            has the number of the last frame in its own ``settings``, and says in
+            ``diagnostics()`` what limited it. All worlds of a batch have as many.
+        most_substeps: Where a number is given, substeps are adaptive, whatever ``substeps`` is:
+            one of 1, 2, 3, 4, 6, 8, 12, 16, 23 ..., each by sqrt(2) the last, or so many at most. A
+            run that wants more warns of what does. None: with ``"adaptive"`` 10 000.
         iterations: Sweeps over the constraints a substep (XPBD). Compliant constraints do not
             depend on it; stiff ones come closer to C = 0.
         integrator: ``"symplectic_euler"`` (first order, any scene); ``"velocity_verlet"`` (second
@@ -73,7 +83,8 @@ class Settings:
     """
 
     dt: float | Any = 1.0 / 60.0  # or AUTO
-    substeps: int | Any = 10  # or AUTO
+    substeps: int | Any = 10  # or AUTO or ADAPTIVE
+    most_substeps: int | None = None
     iterations: int = 1
     integrator: str | type = "symplectic_euler"
     precision: str = "float32"
@@ -108,15 +119,26 @@ class Settings:
                 owner, "relaxation", self.relaxation, above=0.0, maximum=1.0
             ),
         }
-        chosen = [name for name in ("dt", "substeps") if _is_auto(getattr(self, name))]
+        left_open = {"dt": _is(self.dt, AUTO), "substeps": _is(self.substeps, AUTO, ADAPTIVE)}
+        chosen = [name for name, is_open in left_open.items() if is_open]
         if len(chosen) == 2:
             raise validate.fail(
-                owner, "substeps", 'be a number with dt="auto"', AUTO, "choose one of them"
+                owner,
+                "substeps",
+                'be a number with dt="auto"',
+                self.substeps,
+                "choose one of them",
             )
         if "dt" not in chosen:
             checked["dt"] = validate.number(owner, "dt", self.dt, minimum=0.0, unit="s")
         if "substeps" not in chosen:
             checked["substeps"] = validate.whole(owner, "substeps", self.substeps, minimum=1)
+        if self.most_substeps is not None:
+            least = checked.get("substeps", 1)
+            most = validate.whole(owner, "most_substeps", self.most_substeps, minimum=least)
+            checked["most_substeps"] = most
+        elif _is(self.substeps, ADAPTIVE):
+            checked["most_substeps"] = MOST
         if not isinstance(self.integrator, type):
             validate.choice(owner, "integrator", self.integrator, INTEGRATORS)
         validate.choice(owner, "precision", self.precision, PRECISIONS)
@@ -144,7 +166,12 @@ class Settings:
     @property
     def automatic(self) -> bool:
         """Whether dt or substeps are yet to be chosen, by the simulation."""
-        return _is_auto(self.dt) or _is_auto(self.substeps)
+        return _is(self.dt, AUTO) or _is(self.substeps, AUTO, ADAPTIVE)
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether every frame has a number of substeps of its own."""
+        return self.most_substeps is not None
 
     @property
     def plain(self) -> dict[str, Any]:
@@ -165,5 +192,5 @@ class Settings:
         return dataclasses.replace(self, **knobs)
 
 
-def _is_auto(value: Any) -> bool:
-    return isinstance(value, str) and value == AUTO
+def _is(value: Any, *words: str) -> bool:
+    return isinstance(value, str) and value in words

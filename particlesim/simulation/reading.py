@@ -11,6 +11,7 @@ import warp as wp
 
 from ..engine.frames import Frames
 from ..engine.integrators.integrator import Integrator
+from ..engine.limit import Limit
 from ..engine.loop import Loop
 from ..engine.model import Model
 from ..engine.neighbors.lists import Neighbors
@@ -47,9 +48,8 @@ class Reading(Access):
     watchdog: Watchdog
     accounts: Accounts | None
     writer: Writer
-    # Of the loop; settings have numbers in the place of what was "auto".
+    # Of the loop.
     scenes: Sequence[Scene]
-    settings: Settings
     model: Model
     device: Any
     state: State
@@ -61,11 +61,21 @@ class Reading(Access):
 
     def _show(self, loop: Loop) -> None:
         """Have what the loop is made of at hand, by the same names."""
-        self.loop, self.scenes, self.settings = loop, loop.scenes, loop.settings
+        self.loop, self.scenes = loop, loop.scenes
         self.model, self.device, self.state = loop.model, loop.model.device, loop.state
         self.neighbors, self.integrator = loop.neighbors, loop.integrator
         self.interactions, self.constraints = loop.interactions, loop.constraints
         self.thermostats = loop.thermostats
+
+    @property
+    def settings(self) -> Settings:
+        """The knobs, with numbers in the place of what was left open."""
+        return self.loop.settings
+
+    @property
+    def limiter(self) -> Limit | None:
+        """What the last frame's number of substeps was chosen by, where it is adaptive."""
+        return self.loop.limiter
 
     @property
     def incidents(self) -> list[Incident]:

@@ -14,6 +14,7 @@ from ..engine.frames import Frames, Runner
 from ..engine.loop import Loop
 from ..engine.model import batch
 from ..instruments.ledger.accounts import Accounts
+from ..instruments.pace import Pace, adaptive
 from ..instruments.profile import Profile, profiled
 from ..instruments.stability import automatic, warn_if_past
 from ..instruments.watchdog.incident import SimulationWarning
@@ -22,7 +23,7 @@ from ..instruments.watchdog.watch import Watchdog
 from ..interactions.fusion import fuse
 from ..output import checkpoint
 from ..scene.scene import Scene
-from ..scene.settings import Settings
+from ..scene.settings import ADAPTIVE, Settings
 from .access import Writer
 from .reading import Reading
 
@@ -62,7 +63,9 @@ class Simulation(Reading):
                 f"Simulation: settings must be a Settings, got {settings!r}; use Settings(...)."
             )
         scenes = batch(scene, worlds)
-        if settings.automatic:
+        if settings.substeps == ADAPTIVE:
+            settings = adaptive(scenes, settings, device)
+        elif settings.automatic:
             settings = automatic(scenes, settings, device)
         # A ledger keeps account of every part by itself.
         self._show(Loop(scenes, settings, device, list if settings.ledger else fuse))
@@ -72,7 +75,7 @@ class Simulation(Reading):
             self.loop.observers.all.append(self.accounts)
         self.watchdog = Watchdog(self.loop.model, self.loop.neighbors)
         self.rounds = Rounds(self.loop, self.watchdog.limits)
-        self.frames = Frames(self.loop, self.watchdog)
+        self.frames, self.pace = Frames(self.loop, self.watchdog), Pace(self.loop)
         self.writer = Writer(self.frames, self.watchdog, self.rounds, self.accounts)
 
     def substep(self, dt: float) -> None:
@@ -101,9 +104,10 @@ class Simulation(Reading):
         moves = self.particle_count and self.settings.dt > 0
         if moves:
             self._look(first=True)
+            self.pace.begin()
             if self.loop.integrator.carries_forces:
                 self.loop.know_forces()
-            self.frames.run(self.settings.substeps)
+            self.pace.run(self.frames)
             if self.watchdog.alarmed:
                 self.watchdog.attend(self.frames)
         self.loop.frame += 1

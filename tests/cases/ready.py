@@ -13,6 +13,7 @@ SMALL = {
     "freezing": {"cells": 5},
     "galaxy_collision": {"count": 240, "softening": 0.2},
     "gas_in_a_box": {"count": 300},
+    "hydrostatic_tank": {"spacing": 0.1},
     "lj_melt": {"cells": 4},
     "molten_salt": {"edge": 4, "tolerance": 1e-4},
     "phase_transition": {"cells": 4},
@@ -34,8 +35,9 @@ SMALL = {
 # these themselves are swept in the long one.
 LONG = {
     "elastic_rings", "elliptical_drop", "floating_block", "freezing", "galaxy_collision",
-    "molten_salt", "phase_transition", "poiseuille", "polymer_melt", "polytrope", "rain_on_cloth",
-    "sedov_blast", "standing_wave", "star_collision", "taylor_green", "toy_star",
+    "hydrostatic_tank", "molten_salt", "phase_transition", "poiseuille", "polymer_melt",
+    "polytrope", "rain_on_cloth", "sedov_blast", "standing_wave", "star_collision",
+    "taylor_green", "toy_star",
 }  # fmt: skip
 
 

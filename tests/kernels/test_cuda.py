@@ -15,7 +15,6 @@ import particlesim as ps
 from particlesim import kernels
 from particlesim.commands.scene_files import load_scene, ready_scenes
 from particlesim.engine.execution import launch
-from particlesim.engine.execution.launch import Launch, Program
 from particlesim.engine.model import Model
 from particlesim.kernels.precision import KERNELS
 from particlesim.output.history.sample import sample
@@ -193,7 +192,7 @@ SCENES = {
             None, [BELT], smoothing=Bell(),
             viscosity=[ps.ArtificialViscosity(0.1, balsara=True), ps.LaminarViscosity(0.1), XSPH],
         ),
-        {},
+        {"most_substeps": 64},
     ),
     "periodic_fluid": (
         lambda: fluid(BOX, smoothing="cubic_spline", equation_of_state=ps.Polytrope(1.0, 1.5),
@@ -218,14 +217,14 @@ EVERY_KERNEL = (
 def launched(monkeypatch):
     """The kernels that simulations launch; they are noted and not run."""
     kernels = {}
-    make = Launch.__init__
+    make = launch.Launch.__init__
 
     def note(self, kernel, *rest):
         kernels[kernel.module.name] = kernel
         make(self, kernel, *rest)
 
-    monkeypatch.setattr(Launch, "__init__", note)
-    monkeypatch.setattr(Launch, "issue", lambda self: None)
+    monkeypatch.setattr(launch.Launch, "__init__", note)
+    monkeypatch.setattr(launch.Launch, "issue", lambda self: None)
     monkeypatch.setattr(Model, "vectorised", False)
     return kernels
 
@@ -242,6 +241,7 @@ def simulate(name, precision):
     sim.project(1)
     sim.loop.frame = 1
     sim.rounds.make()
+    sim.pace.look()
     for interaction in sim.interactions:
         if isinstance(interaction, ps.SPH):
             with np.errstate(invalid="ignore"):  # densities were not computed
@@ -250,7 +250,7 @@ def simulate(name, precision):
                     given = {"normalized": True, "derivative": what}
                     sim.interpolate(interaction, [(0, 0, 0)], "velocity", **given)
     for constraint in sim.constraints:
-        with launch.record(Program()):
+        with launch.record(launch.Program()):
             constraint.reset([0])
     return sim
 

@@ -43,6 +43,7 @@ def test_an_unknown_knob_lists_the_known_ones(make, refused):
     [
         ("dt", [-1.0, float("nan"), float("inf"), "fast", None]),
         ("substeps", [0, -3, 1.5, True, "ten"]),
+        ("most_substeps", [0, 9, 1.5, "many"]),
         ("iterations", [0, 2.0]),
         ("integrator", ["euler", None]),
         ("precision", ["float16", 64]),
@@ -59,6 +60,17 @@ def test_values_out_of_range(knob, values, refused):
     for value in values:
         with refused(f"Settings: {knob} must"):
             ps.Settings(**{knob: value})
+
+
+def test_adaptive_substeps_have_a_maximum():
+    settings = ps.Settings(substeps="adaptive")
+    assert settings.automatic and settings.adaptive and settings.most_substeps == 10_000
+    assert not settings.replace(substeps=20).automatic and settings.replace(substeps=20).adaptive
+    assert not ps.Settings().adaptive
+    with pytest.raises(ValueError, match="dt must be a number"):
+        ps.Settings(dt="adaptive")
+    with pytest.raises(ValueError, match='be a number with dt="auto"'):
+        ps.Settings(dt="auto", substeps="adaptive")
 
 
 def test_choices_are_listed(refused):

@@ -9,6 +9,8 @@ grids have cells for it.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import warp as wp
 
@@ -44,7 +46,10 @@ class Skin:
         self.struct.since = model.array(np.full(len(unit), -np.inf), wp.float64)
         self.struct.farthest_squared = wp.zeros(len(unit), dtype=wp.float32, device=model.device)
         self.struct.dear = model.array(np.where(contacts, DEAR_OF_CONTACTS, DEAR), wp.float64)
-        self.struct.substep = float(model.settings.substep)
+        # Of adaptive substeps the number of the start is not known to a run that goes on.
+        settings, most = model.settings, model.settings.most_substeps
+        usual = settings.substeps if most is None else math.sqrt(most)
+        self.struct.substep = float(settings.dt / usual)
 
     @property
     def thickness(self) -> np.ndarray:

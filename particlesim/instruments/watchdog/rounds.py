@@ -30,7 +30,7 @@ from ...constraints.contact import Contact
 from ...engine.loop import Loop
 from ..diagnostics import measure, undisturbed
 from ..residuals import UNMET, off, residuals
-from ..stability import warn_if_past
+from ..stability import SAFETY, warn_if_past
 from .incident import SimulationWarning
 from .limits import GROWN, Limits
 
@@ -112,10 +112,17 @@ class Rounds:
                 f"energy must stay within {DRIFT:.0%} of itself or the largest kinetic energy, as "
                 f"all forces have potentials, got {energy[w]:.6g} after {self.start[w]:.6g}, off "
                 f"by {drift[w]:.2g} of it",
-                f"use more substeps than {self.loop.settings.substeps}"
+                self._finer()
                 + ("" if self.loop.integrator.order > 1 else ", or integrator='velocity_verlet'"),
             )  # fmt: skip
         self.off = off
+
+    def _finer(self) -> str:
+        """What makes steps shorter."""
+        settings = self.loop.settings
+        if settings.adaptive:
+            return f"use a safety below {settings.safety or SAFETY:g}"
+        return f"use more substeps than {settings.substeps}"
 
     def _constraints(self) -> None:
         """Tell of what was missed in the last round, too."""

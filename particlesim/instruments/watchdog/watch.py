@@ -22,6 +22,7 @@ from ...engine.model import Model
 from ...engine.neighbors.lists import Neighbors
 from ...engine.state import State
 from ...kernels.instruments.watchdog import check_kernel, hold_kernel
+from ...scene.settings import Settings
 from .incident import Incident, SimulationError, SimulationWarning
 from .limits import ESCAPED, FAST, FINITE, Limits
 from .trace import Culprit, causes, survey, trace
@@ -39,7 +40,7 @@ class Watchdog:
     """
 
     def __init__(self, model: Model, neighbors: Neighbors):
-        self.model, self.settings = model, model.settings
+        self.model = model
         self.limits = Limits(model, neighbors)
         self.flag = wp.zeros(2, dtype=wp.int32, device=model.device)
         # On the CPU the flag is the memory itself: a look needs no copy.
@@ -51,6 +52,11 @@ class Watchdog:
         self.incidents: list[Incident] = []  # what was found, and done about it
         self._mark = wp.zeros(model.world_count, dtype=wp.int32, device=model.device)
         self._held: list[tuple[wp.array, wp.array, wp.array]] = []  # worlds of rows, copy, array
+
+    @property
+    def settings(self) -> Settings:
+        """As they are at present."""
+        return self.model.settings
 
     # On the device ----------------------------------------------------------------------------
 

@@ -39,8 +39,9 @@ def lattice_sum(smoothing: Smoothing, dimension: int, ratio: float) -> float:
 
 
 def spacings(fluid: Any, model: Model) -> np.ndarray:
-    """Of the lattice that particles of their mean mass make at the rest density, by world.
+    """Of the lattice that their lightest particles make at the rest density, by world.
 
+    Others are heavier where a start has them under the weight of what is above.
     (m / rho_0)^(1/d) [length], of several fluids by the mean of their volumes; 0 where the fluid
     has no rest density, or no particles.
     """
@@ -51,7 +52,7 @@ def spacings(fluid: Any, model: Model) -> np.ndarray:
         if len(rows) and peer.fluids.densities:
             own = [rows[number[rows] == k] for k in range(len(peer.fluids.densities))]
             volumes = [
-                mass[each].mean() / density
+                mass[each].min() / density
                 for each, density in zip(own, peer.fluids.densities, strict=True) if len(each)
             ]  # fmt: skip
             found[w] = np.mean(volumes) ** (1.0 / fluid.dimension)

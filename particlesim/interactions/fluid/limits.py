@@ -28,6 +28,8 @@ def fluid_limits(part: Any, probe: Probe) -> list[Limit]:
       (:func:`damping`), mu being the speed at which the fastest meets a typical particle; that of
       another viscosity is asked of its force.
     - acceleration: 0.25 sqrt(h / |a|) (Monaghan 1992).
+    - speed, where substeps are adaptive: the time in which the fastest goes through the reach of
+      one that it meets. It may meet nobody, but within a frame nobody asks again.
     - shifting: 2 over the rate at which :class:`ParticleShifting` evens out the concentration.
     """
     rows = part.pairs.members_host
@@ -50,7 +52,25 @@ def fluid_limits(part: Any, probe: Probe) -> list[Limit]:
         reason = f"0.25 sqrt(h / a), h = {h[k]:.4g}, a = {a[k]:.4g}"
         dt = ACCELERATION * float(np.sqrt(h[k] / a[k]))
         limits.append(Limit(part.name, "acceleration", dt, reason, *probe.place(int(rows[k]))))
-    return limits + _shifting_limit(part, probe, each)
+    return limits + _speed_limit(part, probe, h) + _shifting_limit(part, probe, each)
+
+
+def _speed_limit(part: Any, probe: Probe, h: np.ndarray) -> list[Limit]:
+    """support h over the speed of the fastest and a typical one, in the frame of their world."""
+    speed = _meeting(part, probe)
+    if not probe.settings.adaptive or not speed > 0.0:
+        return []
+    k = int(np.argmin(h))
+    reach = part.smoothing.support * float(h[k])
+    reason = f"reach / v, reach = {reach:.4g}, v = {speed:.4g} of two that meet"
+    place = probe.place(int(part.pairs.members_host[k]))
+    return [Limit(part.name, "speed", reach / speed, reason, *place)]
+
+
+def _meeting(part: Any, probe: Probe) -> float:
+    """The speed at which the fastest meets a typical particle."""
+    speed = probe.relative_speed(part.pairs.members_host)
+    return float(speed.max() + np.sqrt((speed**2).mean()))
 
 
 def _heard(part: Any, probe: Probe, c: np.ndarray) -> np.ndarray:
@@ -90,9 +110,7 @@ def _damping_rates(
         return np.zeros_like(c)
     if not (len(forces) == 1 and isinstance(forces[0], ArtificialViscosity)):
         return np.full_like(c, probe.damping(part))
-    speed = probe.relative_speed(part.pairs.members_host)
-    meeting = speed.max() + np.sqrt((speed**2).mean())
-    strength = each["viscosity_alpha"] * c + 2.0 * each["viscosity_beta"] * meeting
+    strength = each["viscosity_alpha"] * c + 2.0 * each["viscosity_beta"] * _meeting(part, probe)
     return damping(part.smoothing, part.dimension) * strength / each["smoothing_length"]
 
 

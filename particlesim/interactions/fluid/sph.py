@@ -61,7 +61,8 @@ class SPH(Passes):
     lengths of its particles' own, is held by their radius alone.
 
     A run warns of a start whose masses do not make the rest density at their spacing, whose
-    smoothing length is below the spacing, or which moves faster than a liquid's sound.
+    particles overlap or lie behind walls that hold them, whose smoothing length is below the
+    spacing, or whose sound is not ten times as fast as a liquid is, or as it will fall.
 
     State arrays ``density`` and ``pressure``, and ``smoothing_length`` of particles' own, belong to
     the positions at which the forces were taken last.

@@ -59,6 +59,8 @@ def _of_world(part: Any, peer: Any, probe: Probe, w: int, rows: np.ndarray) -> l
         omega = np.sqrt(mu) / (closest**2 + s**2) ** 0.75
         alone = np.linalg.norm(tide, axis=1) < np.linalg.norm(own, axis=1)
         coming = ((d * u).sum(axis=1) < 0) | (energy < 0)
+        if probe.settings.adaptive:  # a frame is asked for what it meets, at most as fast as there
+            coming &= (r - closest) * closest < np.sqrt(mu * p) * probe.settings.dt
     # Who falls straight on another meets what no step is small enough for.
     passing = closest**2 + s**2 > (HEAD_ON * r) ** 2
     ready = alone & coming & passing & (mu > 0) & (omega > 0)

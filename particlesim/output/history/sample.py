@@ -14,11 +14,12 @@ from ...instruments.residuals import residuals
 from ...interactions.fluid.sph import SPH
 from ...kernels.tensor import AXES
 
+TEXT = ("limiter",)  # columns of words
 Observed = Mapping[str, Callable[[Any], Any]]
 
 
 def sample(sim: Source, observe: Observed | None = None) -> dict[str, np.ndarray]:
-    """One row of a history: name to (worlds,), float64; ``observe`` as of ``History``."""
+    """One row of a history: name to (worlds,), numbers or ``TEXT``; see ``History``."""
     with undisturbed(sim):
         potentials: list[np.ndarray] = []
         total = measure(sim, potentials)
@@ -30,6 +31,7 @@ def sample(sim: Source, observe: Observed | None = None) -> dict[str, np.ndarray
         boxed = bool(np.isfinite(total.volume).all())
         names += ["pressure"] if boxed else []
         names += ["volume"] if sim.model.flexible else []
+        names += ["substeps", *TEXT] if sim.settings.adaptive else []
         values |= {name: getattr(total, name) for name in names}
         for a, b in AXES if boxed else ():
             values[f"stress_{'xyz'[a]}{'xyz'[b]}"] = total.stress[:, a, b]

@@ -23,7 +23,7 @@ import numpy as np
 from ... import validate
 from ...engine.source import Source
 from .. import files
-from .sample import Observed, sample
+from .sample import TEXT, Observed, sample
 
 SUFFIXES = (".csv", ".jsonl")
 OWN = ("frame", "time", "world")  # what every line starts with
@@ -38,8 +38,9 @@ class History(files.Closing):
     ``potential:<interaction>`` of each that has one; ``density_error_max:<fluid>`` and
     ``density_error_rms:<fluid>`` of rho / rho0 - 1, where there is a rest density;
     ``residual_max:<constraint>`` and ``residual_rms:<constraint>`` (see
-    :mod:`particlesim.instruments.residuals`); ``observed:<name>`` of what is observed. A run with
-    a history goes as one without, bit for bit.
+    :mod:`particlesim.instruments.residuals`); where substeps are adaptive ``substeps`` and, in
+    words, ``limiter``; ``observed:<name>`` of what is observed. A run with a history goes as one
+    without, bit for bit.
 
     Args:
         sim: The simulation.
@@ -94,9 +95,12 @@ class History(files.Closing):
         values = sample(sim, self.observe)
         if self._file is None:
             self._begin([*OWN, *values])
-        table = np.array(list(values.values()), dtype=np.float64)
+        table = [
+            np.asarray(column, dtype=None if name in TEXT else np.float64).tolist()
+            for name, column in values.items()
+        ]
         lines = [
-            self._line([sim.frame, sim.time, w, *table[:, w].tolist()])
+            self._line([sim.frame, sim.time, w, *(column[w] for column in table)])
             for w in range(sim.model.world_count)
         ]
         self._append("".join(lines).encode())
@@ -126,7 +130,7 @@ class History(files.Closing):
 
     def _line(self, row: list[Any]) -> str:
         if _is_csv(self.path):
-            return ",".join(map(repr, row)) + "\n"
+            return ",".join(each if isinstance(each, str) else repr(each) for each in row) + "\n"
         pairs = zip(self._columns or (), row, strict=True)
         plain = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in pairs}
         return json.dumps(plain) + "\n"
@@ -217,21 +221,25 @@ def _is_csv(path: Path) -> bool:
     return path.suffix.lower() == ".csv"
 
 
-def _csv_rows(lines: list[str]) -> list[dict[str, float]]:
+Row = dict[str, Any]  # numbers, and words of the columns that have them
+
+
+def _csv_rows(lines: list[str]) -> list[Row]:
     return [
-        {name: float(text) for name, text in row.items()}
+        {name: text if name in TEXT else float(text) for name, text in row.items()}
         for row in csv.DictReader(lines, strict=True)
     ]
 
 
-def _json_rows(lines: list[str]) -> list[dict[str, float]]:
-    return [
-        {name: math.nan if v is None else float(v) for name, v in json.loads(line).items()}
-        for line in lines
-    ]
+def _json_rows(lines: list[str]) -> list[Row]:
+    return [{name: _plain(name, v) for name, v in json.loads(line).items()} for line in lines]
 
 
-def _record(rows: list[dict[str, float]]) -> Record:
+def _plain(name: str, value: Any) -> Any:
+    return value if name in TEXT else math.nan if value is None else float(value)
+
+
+def _record(rows: list[Row]) -> Record:
     """Lines as arrays, without a last frame that lacks worlds."""
     worlds = 1 + max((int(row["world"]) for row in rows), default=-1)
     frames = len(rows) // worlds if worlds else 0
