@@ -156,7 +156,7 @@ def test_what_is_refused(change, said):
 
 
 def test_fluids_share_no_particle_and_fit_their_densities():
-    scene = layers(rest_density=[1000.0, 8.0])
+    scene = layers(rest_density=[4000.0, 8.0])  # both too light
     assert "mass must make the rest density" in simulation(scene).interactions[0].complaint()
     scene = ps.Scene()
     group = scene.add_particles(np.eye(3), mass=1.0)
