@@ -24,6 +24,7 @@ SMALL = {
     "phase_transition": {"cells": 4},
     "gas_in_a_box": {"count": 400},
     "polymer_melt": {"edge": 6},
+    "rising_bubble": {"across": 12},
     "molten_salt": {"edge": 4, "tolerance": 1e-4},
 }
 
@@ -39,9 +40,8 @@ def simulate(name, frames, device, settings=None, **options):
 def test_the_ready_scenes_are_all_there():
     expected = (
         "bouncing_block chain dam_break freezing galaxy_collision gas_in_a_box lj_melt "
-        "molten_salt phase_transition pile plummer_sphere polymer_melt sedov_blast sod_tube "
-        "spring_lattice "
-        "star_collision three_body triple_pendulum wave_field"
+        "molten_salt phase_transition pile plummer_sphere polymer_melt rising_bubble sedov_blast "
+        "sod_tube spring_lattice star_collision three_body triple_pendulum wave_field"
     )
     assert set(expected.split()) <= set(NAMES)
 

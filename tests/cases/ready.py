@@ -7,8 +7,8 @@ from particlesim.commands.scene_files import ready_scenes
 # What others stand for in every run: sod_tube for gases with heat, plummer_sphere for gravity,
 # lj_melt for liquids, pile for contacts; these themselves are swept in the long one.
 LONG = {
-    "galaxy_collision", "molten_salt", "phase_transition", "polymer_melt", "sedov_blast",
-    "star_collision",
+    "galaxy_collision", "molten_salt", "phase_transition", "polymer_melt", "rising_bubble",
+    "sedov_blast", "star_collision",
 }  # fmt: skip
 
 
