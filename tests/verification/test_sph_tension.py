@@ -53,10 +53,10 @@ def stretched_drop(x):
     return np.linalg.norm(x / [1.1, 1 / 1.1, 1.0], axis=1)
 
 
-@pytest.mark.parametrize("dimension, across, reach", [(2, 10, 2.0), (2, 16, 2.0), (3, 6, 1.6)])
-def test_pressure_in_a_drop(dimension, across, reach):
-    """sigma / R more than outside in the plane, 2 sigma / R in space (Laplace)."""
-    sim = drop(round_drop, across, dimension, viscosity=ps.ArtificialViscosity(0.5), reach=reach)
+def excess(dimension, across, reach, ratio=1.0):
+    """By how much the pressure in a round drop is above (d - 1) sigma / R, as a part of that."""
+    thick = ps.ArtificialViscosity(0.5)
+    sim = drop(round_drop, across, dimension, ratio, thick, reach=reach)
     sim.run(20)
     found, h = [], reach / across
     for _ in range(20):  # over the sound of the start, whose period is about 2 SIDE / c = 0.4
@@ -65,11 +65,29 @@ def test_pressure_in_a_drop(dimension, across, reach):
         inside = np.arange(len(r)) < len(sim.scenes[0]["drop"])
         deep, outside = inside & (r < 1 - 2 * h), ~inside & (r > 1 + 2 * h)
         found.append(p[deep].mean() - p[outside].mean())
-    # The surface is 2 h thick: of second order in h / R, and the lattice's drop is R within s / 4.
-    assert np.mean(found) == pytest.approx((dimension - 1) * SIGMA, rel=0.04 + 0.5 * h**2)
+    volume = (sim.scenes[0].mass / sim.get("density"))[inside].sum()
+    radius = (volume / (np.pi if dimension == 2 else 4 / 3 * np.pi)) ** (1 / dimension)
     # Floating, it stays where it is: forces sum to round-off.
-    assert np.abs(sim.position[inside].mean(axis=0)).max() < 0.01
-    assert np.abs(sim.diagnostics().momentum).max() < 1e-4
+    assert np.abs(sim.position[inside].mean(axis=0)).max() < 1e-5
+    assert np.abs(sim.diagnostics().momentum).max() < 1e-5
+    return np.mean(found) / ((dimension - 1) * SIGMA / radius) - 1
+
+
+def test_pressure_in_a_drop():
+    """Laplace's law: sigma / R in the plane, and the error falls with the spacing.
+
+    The surface is some 2 h thick, and half of that next to a radius is h / R: 33 % at 6 spacings,
+    8 % at 24, of which a tenth was found. What is left of sound leaves some 0.5 % open.
+    """
+    found = [excess(2, across, 2.0) for across in (6, 12)]
+    assert abs(found[0]) < 0.06 and abs(found[1]) < 0.03
+    assert abs(found[1]) < 0.7 * abs(found[0])
+    assert abs(excess(2, 8, 2.0, ratio=100.0)) < 0.04
+
+
+def test_pressure_in_a_ball():
+    """2 sigma / R: twice as much curved, twice as far off."""
+    assert abs(excess(3, 6, 1.6)) < 0.08
 
 
 def test_a_square_drop_becomes_round():
