@@ -42,6 +42,7 @@ from .interactions.fluid.equations_of_state import (
     Polytrope,
     Tait,
 )
+from .interactions.fluid.interfaces.surface_tension import SurfaceTension
 from .interactions.fluid.lengths import AdaptiveSmoothing
 from .interactions.fluid.smoothing.gaussian import Gaussian
 from .interactions.fluid.smoothing.mueller import MuellerViscosity, Poly6, Spiky
@@ -160,6 +161,7 @@ __all__ = [
     "StabilityWarning",
     "Stress",
     "Surface",
+    "SurfaceTension",
     "Table",
     "Tait",
     "Thermostat",

@@ -134,7 +134,8 @@ KIN = {
     "Mie": "LennardJones", "Yukawa": "PairPotential", "Morse": "PairPotential",
     "SoftSphere": "PairPotential", "Coulomb": "PairPotential", "Electrostatics": "PairPotential",
 }  # fmt: skip
-BOUND = ("FieldForce",)  # to a grid, which rests in the frame that it is made in
+# To a grid, which rests in the frame that it is made in, and to groups of several fluids.
+BOUND = ("FieldForce", "SurfaceTension")
 
 
 NU = Quantity(0.1, (2, 0, -1))

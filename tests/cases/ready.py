@@ -22,6 +22,7 @@ SMALL = {
     "polymer_melt": {"edge": 6},
     "polytrope": {"count": 300},
     "rain_on_cloth": {"spacing": 0.05},
+    "rising_bubble": {"across": 12},
     "sedov_blast": {"side": 10},
     "sod_tube": {"count": 90},
     "standing_wave": {"spacing": 1 / 16},
@@ -36,8 +37,8 @@ SMALL = {
 LONG = {
     "elastic_rings", "elliptical_drop", "floating_block", "freezing", "galaxy_collision",
     "hydrostatic_tank", "molten_salt", "phase_transition", "poiseuille", "polymer_melt",
-    "polytrope", "rain_on_cloth", "sedov_blast", "standing_wave", "star_collision",
-    "taylor_green", "toy_star",
+    "polytrope", "rain_on_cloth", "rising_bubble", "sedov_blast", "standing_wave",
+    "star_collision", "taylor_green", "toy_star",
 }  # fmt: skip
 
 

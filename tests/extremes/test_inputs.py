@@ -23,6 +23,10 @@ def above(a: wp.vec3, level: float):
     return a[1] - level
 
 
+FLUIDS = ps.SPH(["oil", "water"], smoothing_length=0.1, rest_density=[0.9, 1.0],
+                equation_of_state=ps.Tait(10.0))  # fmt: skip
+
+
 @ps.law
 def wave(angle: float, level: float):
     """A law of an angle or a dihedral."""
@@ -85,6 +89,7 @@ PARTS = {
                   "opening_angle": 0.5, "substeps": 2, "iterations": 2, "threads": 1},
     ps.SoftSphere: {"epsilon": 1.0, "sigma": 1.0, "exponent": 2.0},
     ps.Springs: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0, "damping": 0.1},
+    ps.SurfaceTension: {"fluid": FLUIDS, "coefficient": 1.0},
     ps.Tait: {"sound_speed": 10.0, "exponent": 7.0},
     ps.UniformGravity: {"acceleration": (0, -9.81, 0)},
     ps.XSPH: {"epsilon": 0.5},

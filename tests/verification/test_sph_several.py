@@ -64,3 +64,47 @@ def test_a_light_fluid_rests_on_a_heavy_one(ratio, stiffness):
         assert line[1] == pytest.approx(0.5 * rho[1] * G, abs=(0.02 + open_by) * whole)
     assert np.mean(force) == pytest.approx(-0.25 * G * sum(rho), rel=0.02)
     assert np.linalg.norm(sim.velocity, axis=1).max() < 0.1 * np.sqrt(G)
+
+
+def test_an_internal_wave_has_its_period():
+    """omega^2 = g k (rho - rho') / (rho coth k H + rho' coth k H'), between floor and lid (Lamb).
+
+    A standing wave where a fluid of half the density lies on another, half a metre of each.
+    """
+    spacing, height, c, k, start = 1 / ACROSS, 0.08, 5.0, 2 * np.pi, 0.1
+    rho, stiffness = np.array([1.0, 0.5]), 25.0
+    x, y = ps.sample.box((0, 0, 0), (1, 1, 0), spacing), np.linspace(0.0, 1.0, 401)
+    # Under its own weight, and under 0.1 at the lid.
+    p = start + G * np.where(y > 0.5, rho[1] * (1 - y), 0.5 * rho[1] + rho[0] * (0.5 - y))
+    dense = (1 + 7 * p / stiffness) ** (1 / 7)
+    below = np.concatenate([[0.0], np.cumsum(0.5 * (dense[1:] + dense[:-1]) * np.diff(y))])
+    x[:, 1] = np.interp(x[:, 1] * below[-1], below, y)
+    low = x[:, 1] < 0.5 + height * np.cos(k * x[:, 0])
+    scene = ps.Scene(periodic=((0, None, None), (1, None, None)))
+    groups = [
+        scene.add_particles(x[own], mass=each * spacing**2 * below[-1], radius=spacing / 2)
+        for own, each in zip((low, ~low), rho, strict=True)
+    ]
+    scene.add_interaction(ps.UniformGravity((0, -G, 0)))
+    scene.add_interaction(
+        ps.SPH(groups, smoothing_length=2 * spacing, rest_density=rho, dimension=2,
+               equation_of_state=[ps.Tait(c), ps.Tait(c * 2**0.5)],
+               viscosity=ps.LaminarViscosity(0.001))
+    )  # fmt: skip
+    for point, normal in (((0, 0, 0), (0, 1, 0)), ((0, 1, 0), (0, -1, 0))):
+        scene.add_constraint(ps.PlaneBoundary(point, normal))
+    sim = ps.Simulation(scene, ps.Settings(dt=0.05, substeps=12), device="cpu")
+    period = 2 * np.pi / np.sqrt(G * k * (rho[0] - rho[1]) * np.tanh(k / 2) / rho.sum())
+    energy, side, wave = sim.diagnostics().energy[0], np.sort(np.where(low, -1, 1)), []
+    for _ in range(int(1.05 * period / 0.05)):
+        sim.step()
+        wave.append((side * np.cos(k * sim.position[:, 0])).mean())
+    wave = np.array(wave)
+    (n,) = np.nonzero(wave[:-1] * wave[1:] < 0)
+    zeros = 0.05 * (1 + n + wave[n] / (wave[n] - wave[n + 1]))
+    # Viscous layers of sqrt(2 nu / omega) = 0.04 on both sides take about half of k times that in
+    # parts of the frequency; a surface that is 2 h = 0.2 thick takes as much.
+    assert np.diff(zeros).mean() == pytest.approx(period / 2, rel=0.05)
+    # Of what the wave has, rho g height^2 / 8, viscosity takes most, and nothing else does.
+    whole = 0.5 * G * (rho[0] - rho[1]) * height**2 / 2
+    assert -whole < sim.diagnostics().energy[0] - energy < 0

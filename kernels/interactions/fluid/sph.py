@@ -132,7 +132,9 @@ def drag_function(
         if wp.static(several):
             share_i = read(d.mass, i) * p.share
             share_j = read(d.mass, j) * p.share
-            D = drag(r2, share_i * state_i[1], share_j * state_j[1], c, p) * (share_i * share_j)
+            rho_i, rho_j = share_i * state_i[1], share_j * state_j[1]
+            D = drag(r2, rho_i, rho_j, c, read(d.fluid, i), read(d.fluid, j), p)
+            D *= share_i * share_j
         else:
             D = drag(r2, state_i[1], state_j[1], c, p)
         gradient = (state_j[0] * p.sigma) * slope(wp.sqrt(r2) * p.inverse_h)

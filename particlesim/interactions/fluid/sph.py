@@ -10,7 +10,7 @@ import numpy as np
 from ... import validate
 from .equations_of_state import EquationOfState
 from .heat import ENERGY
-from .interfaces.fluids import FLUID, Fluids
+from .interfaces.fluids import FLUID, PAIR, Fluids
 from .lengths import LENGTH, AdaptiveSmoothing
 from .passes import Passes
 from .smoothing import SmoothingFunction, summable
@@ -158,8 +158,9 @@ class SPH(Passes):
 
     def variables(self, name: str) -> tuple[str, ...]:
         """What a law is called with."""
-        of_fluid = self.fluids.several and name in EquationOfState.law_names
-        return (*VARIABLES[name], *[LENGTH] * bool(self.adaptive), *[FLUID] * of_fluid)
+        numbers = PAIR if name == "drag" else (FLUID,) * (name in EquationOfState.law_names)
+        numbers = numbers if self.fluids.several else ()
+        return (*VARIABLES[name], *[LENGTH] * bool(self.adaptive), *numbers)
 
     def _take(self, prefix: str, part: Any, *others: Any) -> None:
         """Note what fills the arguments of a part's laws; its parameters join the fluid's.
@@ -170,13 +171,17 @@ class SPH(Passes):
         if prefix == "state" or not self.fluids.several:
             own["rest_density"] = self.fluids.source("rest_density")
         for name, value in part.parameters.items():
+            field = f"{prefix}_{name}"
             if others:
                 values = [value, *(other.parameters[name] for other in others)]
-                self.parameters |= self.fluids.keep(f"{prefix}_{name}", values)
-                own[name] = self.fluids.source(f"{prefix}_{name}")
+                self.parameters |= self.fluids.keep(field, values)
+                own[name] = self.fluids.source(field)
+            elif np.ndim(value):
+                self.parameters |= self.fluids.keep(field, self.fluids.by_fluids(name, value))
+                own |= {f"{name}{each[-2:]}": self.fluids.source(field, each) for each in PAIR}
             else:
-                self.parameters[f"{prefix}_{name}"] = value
-                own[name] = f"p.{prefix}_{name}"
+                self.parameters[field] = value
+                own[name] = f"p.{field}"
         for name, law in part.laws.items():
             sources = own | {variable: variable for variable in self.variables(name)}
             validate.known(part.name, law.parameters, sources, f"argument of {law.name}")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from ... import validate
@@ -109,6 +111,14 @@ def laminar_drag(density_i: float, density_j: float, kinematic_viscosity: float)
     return kinematic_viscosity * (density_i + density_j) / (density_i * density_j)
 
 
+@law
+def laminar_drag_between(
+    density_i: float, density_j: float, kinematic_viscosity_i: float, kinematic_viscosity_j: float
+):
+    both = kinematic_viscosity_i * density_i + kinematic_viscosity_j * density_j
+    return both / (density_i * density_j)
+
+
 class LaminarViscosity(Viscosity):
     """The viscosity of a real fluid, nu lap v (Morris, Fox and Zhu 1997, eq. 22).
 
@@ -119,8 +129,11 @@ class LaminarViscosity(Viscosity):
     conserves the momentum to round-off, the angular momentum only as well as the sums make a
     laplacian, and brakes any relative motion.
 
+    In several fluids nu rho is that of either particle: the term is V_i V_j (eta_i + eta_j) W'_ij
+    / r v_ij with dynamic viscosities eta = nu rho and volumes V = m / rho (Hu and Adams 2006).
+
     Args:
-        kinematic_viscosity: nu [length^2/time], at least 0.
+        kinematic_viscosity: nu [length^2/time], at least 0; or one a fluid.
 
     Example:
         >>> LaminarViscosity(1e-6).parameters
@@ -129,13 +142,15 @@ class LaminarViscosity(Viscosity):
 
     drag = laminar_drag
 
-    def __init__(self, kinematic_viscosity: float) -> None:
+    def __init__(self, kinematic_viscosity: float | Sequence[float]) -> None:
         self.parameters = {
-            "kinematic_viscosity": validate.number(
+            "kinematic_viscosity": validate.table(
                 self.name, "kinematic_viscosity", kinematic_viscosity, minimum=0.0,
                 unit="length^2/time",
             )
         }  # fmt: skip
+        if np.ndim(kinematic_viscosity):
+            self.drag = laminar_drag_between
 
 
 class XSPH(Viscosity):

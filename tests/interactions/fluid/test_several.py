@@ -12,7 +12,8 @@ SIZE = 0.1  # of the particles' lattice
 H = 1.3 * SIZE
 RHO = np.array([1000.0, 2.0])
 STATES = [ps.Tait(10.0), ps.Tait(100.0, 1.4)]
-VISCOSITY = [ps.ArtificialViscosity(0.2, 0.1), ps.LaminarViscosity(0.3)]
+NU = np.array([0.3, 2.0])
+VISCOSITY = [ps.ArtificialViscosity(0.2, 0.1), ps.LaminarViscosity(NU)]
 BOX = ps.BoxBoundary((0, 0, 0), (1, 2, 1))
 
 
@@ -61,7 +62,8 @@ def reference(scene):
     push = P / n**2
     along = -(push[:, None] + push + np.outer(m, m) * pi) * slope
     # Morris' term is that of dynamic viscosities: V_i V_j (eta_i + eta_j) W' / r v_ij.
-    aside = np.outer(1 / n, 1 / n) * 0.3 * (rho[:, None] + rho) * slope
+    eta = NU[fluid] * rho
+    aside = np.outer(1 / n, 1 / n) * (eta[:, None] + eta) * slope
     return rho, P, (along[..., None] * x_ij + aside[..., None] * v_ij).sum(axis=1)
 
 
@@ -108,6 +110,7 @@ def test_forces_are_minus_the_gradient_of_the_energy(walls):
 def test_fluids_of_equal_masses_are_one():
     alike = {"rest_density": [1000.0, 1000.0], "equation_of_state": [STATES[0]] * 2}
     one = {"rest_density": 1000.0, "equation_of_state": STATES[0]}
+    alike["viscosity"] = one["viscosity"] = [VISCOSITY[0], ps.LaminarViscosity(0.3)]
     forces = []
     for options in (alike, one):
         scene = layers(speed=1.0, walls=[BOX], **options)
@@ -146,6 +149,7 @@ def test_energy_is_kept_without_viscosity():
         ({"equation_of_state": [ps.IdealGas(1.4)] * 2}, "no internal energy with several fluids"),
         ({"smoothing_length": ps.AdaptiveSmoothing()}, "one number with several fluids"),
         ({"rest_density": [1000.0, 0.0]}, "above 0"),
+        ({"viscosity": ps.LaminarViscosity([1.0, 2.0, 3.0])}, "one for each of 2 groups"),
         ({"group": None}, "list of groups, one a fluid"),
     ],
 )

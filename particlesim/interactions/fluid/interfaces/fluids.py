@@ -15,6 +15,7 @@ from ...selection import are_groups, kinds_of
 from ..equations_of_state import EquationOfState
 
 FLUID = "fluid"  # the number of a particle's fluid, from 0, as laws are given it
+PAIR = ("fluid_i", "fluid_j")  # and those of a pair
 
 
 class Fluids:
@@ -38,14 +39,12 @@ class Fluids:
                 owner, "group", f"be a list of groups, one a fluid, with {', '.join(lists)} by "
                 "fluids", group, "give [these, those]",
             )  # fmt: skip
+        self.owner, self.fields = owner, dict[str, list[str]]()
         self.groups = list(group) if lists else [group]
         count = len(self.groups)
         for name, values in lists.items():
             if len(values) != count:
-                raise validate.fail(
-                    owner, name, f"be one, or one for each of {count} groups", values,
-                    "give as many as there are fluids",
-                )  # fmt: skip
+                raise self._uneven(name, values)
         self.states = lists.get("equation_of_state", [equation_of_state] * count)
         for state in self.states:
             if not isinstance(state, EquationOfState):
@@ -64,12 +63,23 @@ class Fluids:
                 validate.number(owner, "rest_density", each, above=0.0, unit="mass/length^d")
                 for each in lists.get("rest_density", [rest_density] * count)
             ]
-        self.owner, self.fields = owner, dict[str, list[str]]()
 
     @property
     def several(self) -> bool:
         """There is more than one."""
         return len(self.groups) > 1
+
+    def by_fluids(self, name: str, values: Sequence[float]) -> Sequence[float]:
+        """Values of as many as there are."""
+        if not self.several or np.shape(values) != (len(self.groups),):
+            raise self._uneven(name, values)
+        return values
+
+    def _uneven(self, name: str, values: Any) -> ValueError:
+        return validate.fail(
+            self.owner, name, f"be one, or one for each of {len(self.groups)} groups", values,
+            "give as many as there are fluids",
+        )  # fmt: skip
 
     def keep(self, name: str, values: Sequence[float]) -> dict[str, float]:
         """A parameter by fluids, as parameters of the ``SPH``."""
@@ -77,9 +87,9 @@ class Fluids:
         self.fields[name] = fields
         return dict(zip(fields, values, strict=True))
 
-    def source(self, name: str) -> str:
-        """Source of the parameter of a particle's fluid."""
-        return chosen(FLUID, [f"p.{field}" for field in self.fields.get(name, [name])])
+    def source(self, name: str, fluid: str = FLUID) -> str:
+        """Source of the parameter of a particle's fluid, whose number is ``fluid``."""
+        return chosen(fluid, [f"p.{field}" for field in self.fields.get(name, [name])])
 
     def numbers(self, scene: Any) -> np.ndarray:
         """Of the fluid of each particle of a scene, (n,); what is of none is never read."""
