@@ -40,6 +40,10 @@ class Diagnostics(Report):
     minus the stress of solids, symmetric, (worlds, 3, 3) [energy/length^3]. It is not a number
     where an axis is open, or where something gives its virial as one number: a fluid, a tree,
     an Ewald sum, contacts.
+
+    ``density_error`` and ``divergence_error`` are what the last substep of a :class:`DFSPH` has
+    left, on average and in parts of the rest density, and ``pressure_iterations`` what it took for
+    both, (worlds,); not numbers and 0 in a scene without one.
     """
 
     mass: np.ndarray
@@ -51,6 +55,9 @@ class Diagnostics(Report):
     free: np.ndarray
     volume: np.ndarray
     stress: np.ndarray
+    density_error: np.ndarray
+    divergence_error: np.ndarray
+    pressure_iterations: np.ndarray
 
     @property
     def energy(self) -> np.ndarray:
@@ -172,8 +179,21 @@ def _measure(sim: Source, forces: Source, potentials: list[np.ndarray] | None) -
     known = np.where(total[:, 10] == 0.0, volume, np.nan)[:, None, None]
     return Diagnostics(
         total[:, 0], total[:, 1:4], total[:, 4:7], total[:, 7], total[:, 8], total[:, 9], free,
-        volume, matrices(total[:, 11:]) / known,
+        volume, matrices(total[:, 11:]) / known, *_of_pressures(sim),
     )  # fmt: skip
+
+
+def _of_pressures(sim: Source) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Errors of density and of divergence, and iterations; of several fluids the most."""
+    worlds = sim.model.world_count
+    errors = {what: np.full(worlds, np.nan) for what in ("density", "divergence")}
+    iterations = np.zeros(worlds, dtype=int)
+    for part in sim.interactions:
+        found = part.iterated()
+        for each in found:
+            errors[each.what] = np.fmax(errors[each.what], each.error)
+        iterations = np.maximum(iterations, sum(each.iterations for each in found))
+    return errors["density"], errors["divergence"], iterations
 
 
 @contextlib.contextmanager
