@@ -51,6 +51,21 @@ def steepness(
     return function(steep)
 
 
+def pressure_pull(slope: wp.Function, precision: Precision, data: Any, params: Any) -> wp.Function:
+    """``pull(i, j, approach, r2, d, p)``: w of a_ij = w x_ij, by pressures alone.
+
+    From arrays of its own: of the four numbers of a fluid's slot it would need two, and a loop that
+    leaves out half of what lies side by side does not vectorise.
+    """
+    real, read = precision.scalar, reader(precision)
+    steep = steepness(slope, False, precision, data, params)
+
+    def pull(i: int, j: int, approach: real, distance2: real, d: data, p: params):
+        return -steep(i, j, approach, distance2, d, p) * (read(d.k, i) + read(d.k, j))
+
+    return function(pull)
+
+
 def rate_term(
     steep: wp.Function, dimension: int, precision: Precision, data: Any, params: Any
 ) -> Term:

@@ -39,7 +39,8 @@ def begin_kernel(precision: Precision, fluid: Any) -> wp.Kernel:
         warm: wp.array(dtype=real),
         dt: real,
         push: real,
-        state_io: wp.array(dtype=vec4),
+        state: wp.array(dtype=vec4),
+        k_out: wp.array(dtype=real),
         source_out: wp.array(dtype=real),
         before_out: wp.array(dtype=pair2),
         running_out: wp.array(dtype=wp.int32),
@@ -49,12 +50,11 @@ def begin_kernel(precision: Precision, fluid: Any) -> wp.Kernel:
         """s = gap / dt^2 + drho/dt / dt, of what is beyond the rest density the part ``push``."""
         i = first + wp.tid()
         w = pairs.world[i]
-        state = state_io[i]
-        gap = state[1] - fluids[w].rest_density
+        gap = state[i][1] - fluids[w].rest_density
         gap = wp.where(gap > real(0.0), push * gap, gap)
         source_out[i] = (gap / dt + rate[i]) / dt
         k = warm[pairs.order[i]]
-        state_io[i] = vec4(state[0], state[1], k, state[3])
+        k_out[i] = k
         before_out[i] = pair2(k, real(0.0))
         running_out[w] = 1
         iterations_out[w] = 0
@@ -66,14 +66,15 @@ def begin_kernel(precision: Precision, fluid: Any) -> wp.Kernel:
 @functools.cache
 def residual_kernel(precision: Precision) -> wp.Kernel:
     """Kernel: how far pressures are off, by block."""
-    real, pair2, vec4 = precision.scalar, precision.vector(2), precision.vector(4)
+    real, pair2 = precision.scalar, precision.vector(2)
 
     @register
     def sum_residuals(
         first: int,
         begin: wp.array(dtype=wp.int32),
         end: wp.array(dtype=wp.int32),
-        state: wp.array(dtype=vec4),
+        m: wp.array(dtype=real),
+        pressures: wp.array(dtype=real),
         source: wp.array(dtype=real),
         rate: wp.array(dtype=real),
         diagonal: wp.array(dtype=real),
@@ -87,19 +88,19 @@ def residual_kernel(precision: Precision) -> wp.Kernel:
         flag_out[0] = 0
         sums = wp.vec4d()
         for i in range(begin[block], end[block]):
-            k = state[i][2]
+            k = pressures[i]
             A = diagonal[i]
             r = source[i] + rate[i]
             residual_out[i] = r
             off = wp.where(r > real(0.0), r, wp.min(-r, A * k))
             dk = wp.float64(k - before[i][0])
             dr = wp.float64(before[i][1] - r)
-            m = wp.float64(state[i][0])
+            mass = wp.float64(m[i])
             sums[0] = sums[0] + wp.float64(off)
-            sums[1] = sums[1] + m * wp.float64(A) * dk * dk
-            sums[2] = sums[2] + m * dk * dr
+            sums[1] = sums[1] + mass * wp.float64(A) * dk * dk
+            sums[2] = sums[2] + mass * dk * dr
             if A > real(0.0):
-                sums[3] = sums[3] + m * dr * dr / wp.float64(A)
+                sums[3] = sums[3] + mass * dr * dr / wp.float64(A)
         sums_out[block] = sums
 
     return sum_residuals
@@ -157,7 +158,7 @@ def decide_kernel(fluid: Any) -> wp.Kernel:
 @functools.cache
 def correct_kernel(precision: Precision) -> wp.Kernel:
     """Kernel: pressures come to where they fit."""
-    real, pair2, vec4 = precision.scalar, precision.vector(2), precision.vector(4)
+    real, pair2 = precision.scalar, precision.vector(2)
 
     @register
     def correct(
@@ -167,18 +168,17 @@ def correct_kernel(precision: Precision) -> wp.Kernel:
         omega: wp.array(dtype=wp.float64),
         residual: wp.array(dtype=real),
         diagonal: wp.array(dtype=real),
-        state_io: wp.array(dtype=vec4),
+        k_io: wp.array(dtype=real),
         before_out: wp.array(dtype=pair2),
     ):
         """k <- max(0, k + omega r / A_ii) in worlds that go on."""
         i = first + wp.tid()
         w = pairs.world[i]
         if running[w] != 0:
-            state = state_io[i]
-            k = state[2]
+            k = k_io[i]
             before_out[i] = pair2(k, residual[i])
             if diagonal[i] > real(0.0):
                 k = wp.max(k + real(omega[w]) * residual[i] / diagonal[i], real(0.0))
-            state_io[i] = vec4(state[0], state[1], k, state[3])
+            k_io[i] = k
 
     return correct

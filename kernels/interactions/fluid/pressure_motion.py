@@ -46,23 +46,22 @@ def foresee_kernel(precision: Precision, places: int) -> wp.Kernel:
 @functools.cache
 def settle_kernel(precision: Precision) -> wp.Kernel:
     """Kernel: what a solve has found counts."""
-    real, vec3, vec4 = precision.scalar, precision.vec3, precision.vector(4)
+    real, vec3 = precision.scalar, precision.vec3
 
     @register
     def settle(
         first: int,
         order: wp.array(dtype=wp.int32),
-        state: wp.array(dtype=vec4),
+        k: wp.array(dtype=real),
         a: wp.array(dtype=vec3),
         found_out: wp.array(dtype=real),
-        k_io: wp.array(dtype=real),
+        total_io: wp.array(dtype=real),
         b_io: wp.array(dtype=vec3),
     ):
         """What was found counts."""
         i = first + wp.tid()
-        k = state[i][2]
-        found_out[order[i]] = k
-        k_io[i] = k_io[i] + k
+        found_out[order[i]] = k[i]
+        total_io[i] = total_io[i] + k[i]
         b_io[i] = b_io[i] + a[i]
 
     return settle

@@ -82,12 +82,11 @@ def test_answers_are_symmetric(kind):
     """Sum m l (A k) is that with k and l exchanged, and A has the diagonal that it is told."""
     fluid = bound(simulation(water(kind)))
     passes, random = fluid.solver.passes, np.random.default_rng(2)
-    state = fluid.slot_state.numpy().copy()
-    m, count = state[:, 0].copy(), len(state)
+    m = fluid.pairs.fields["mass"].numpy()
+    count = len(m)
 
     def answer(k):
-        state[:, 2] = k
-        fluid.slot_state.assign(state)
+        passes.k.assign(k.astype(float))
         passes.answer()
         return -passes.rate.numpy()
 

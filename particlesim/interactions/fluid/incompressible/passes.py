@@ -11,7 +11,7 @@ import warp as wp
 from ....kernels.interactions.fluid import dfsph as kernels
 from ....kernels.interactions.fluid import images
 from ....kernels.interactions.fluid.seen import Seen
-from ....kernels.interactions.fluid.sph import DIRECTIONS, force_term, pull_function
+from ....kernels.interactions.fluid.sph import DIRECTIONS, force_term
 from ....kernels.interactions.fluid.walls import normals_of
 from ...pair_loop import PairLoop
 from ..walls import Pass
@@ -35,12 +35,12 @@ class PressurePasses:
         self.normal = self.walls.normal if self.walls else none
         self.rate_at_walls = self.walls.rate if self.walls else self.parting
         self.a, self.u = pairs.array(precision.vec3), pairs.array(precision.vec3)
-        self.rate, self.diagonal = pairs.array(precision.scalar), pairs.array(precision.scalar)
+        self.k, self.rate, self.diagonal = (pairs.array(precision.scalar) for _ in range(3))
         x, m = pairs.fields["position"], pairs.fields["mass"]
         self.of_velocity = self._rates({"x": x, "m": m, "v": self.u}, self.parting)
         self.of_acceleration = self._rates({"x": x, "m": m, "v": self.a}, self.parting_faster)
         self.diagonals = self._diagonals({"x": x, "m": m})
-        self.accelerations = self._accelerations({"x": x, "state": fluid.slot_state})
+        self.accelerations = self._accelerations({"x": x, "m": m, "k": self.k})
 
     def sum_diagonal(self) -> None:
         """A_ii."""
@@ -113,7 +113,7 @@ class PressurePasses:
 
     def _accelerations(self, fields: Mapping[str, wp.array]) -> list[Pass]:
         loop, dimension = self._loop("Pressures", fields), self.fluid.dimension
-        pull = pull_function(self.fluid.slope, None, False, *self._types(loop))
+        pull = kernels.pressure_pull(self.fluid.slope, *self._types(loop))
         term = force_term(pull, None, False, dimension, *self._types(loop))
         out = {"a": self.a, "w": self.fluid.state.inverse_mass}
         found = [Pass(loop, term, kernels.keep_acceleration, out)]
@@ -121,7 +121,7 @@ class PressurePasses:
             out = {**out, "normal": self.normal, "parting": self.parting_faster}
             loop = self._loop("PressuresBesideWalls", {**fields, "wall": self.walls.distance})
             types = self._types(loop)
-            pull = pull_function(self.fluid.slope, None, False, *types)
+            pull = kernels.pressure_pull(self.fluid.slope, *types)
             for seen in self._seen(False):
                 term = images.force_term(pull, None, seen, DIRECTIONS[dimension], *types)
                 own = images.own_push(pull, None, seen, *types)

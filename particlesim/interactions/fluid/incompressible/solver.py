@@ -78,7 +78,7 @@ class PressureSolver:
         self.passes = PressurePasses(fluid)
         pairs, precision = fluid.pairs, model.precision
         real, pair2 = precision.scalar, precision.vector(2)
-        self.k, self.source, self.residual = (pairs.array(real) for _ in range(3))
+        self.total, self.source, self.residual = (pairs.array(real) for _ in range(3))
         self.b, self.before = pairs.array(precision.vec3), pairs.array(pair2)
         offsets = np.append(pairs.begin_host, pairs.count)
         begin, end, world = blocks(offsets, kernels.BLOCK)
@@ -94,7 +94,7 @@ class PressureSolver:
     def solve(self, state: State, dt: float) -> None:
         """Add the force of pressures to those that there are."""
         fluid, count, precision = self.fluid, self.fluid.pairs.count, self.model.precision
-        zero(self.model, self.k)
+        zero(self.model, self.total)
         zero(self.model, self.b)
         self.passes.sum_diagonal()
         self._solve(self.divergence, state, 0.0, dt)
@@ -113,40 +113,42 @@ class PressureSolver:
     def give(self, state: State) -> None:
         """Slots and particles get the pressures."""
         pairs = self.fluid.pairs
-        inputs = [pairs.order, self.k, self.fluid.slot_state, state.pressure]
+        inputs = [pairs.order, self.total, self.fluid.slot_state, state.pressure]
         self._launch(motion.pressure_kernel(self.model.precision), pairs.count, inputs)
 
     def recall(self, state: State) -> None:
         """Pressures that the state tells of are those that :meth:`give` gives."""
         pairs = self.fluid.pairs
-        inputs = [pairs.order, state.density, state.pressure, self.k]
+        inputs = [pairs.order, state.density, state.pressure, self.total]
         self._launch(motion.recall_kernel(self.model.precision), pairs.count, inputs)
 
     def _solve(self, solve: Solve, state: State, ahead: float, dt: float) -> None:
         """One solve, at the velocities that forces have made ``ahead``."""
         fluid, passes, precision = self.fluid, self.passes, self.model.precision
-        pairs, slots, worlds = fluid.pairs, fluid.slot_state, self.model.world_count
+        pairs, worlds = fluid.pairs, self.model.world_count
         foresee = motion.foresee_kernel(precision, passes.places)
         inputs = [pairs.order, pairs.fields["velocity"], state.force, state.inverse_mass, self.b,
                   passes.rate_at_walls, passes.normal, ahead, passes.u, passes.parting]  # fmt: skip
         self._launch(foresee, pairs.count, inputs)
         passes.sum_rate()
-        inputs = [pairs.pairs, fluid.params, passes.rate, solve.warm, dt, solve.push, slots,
-                  self.source, self.before, self.running, solve.iterations, self.flag]  # fmt: skip
+        inputs = [pairs.pairs, fluid.params, passes.rate, solve.warm, dt, solve.push,
+                  fluid.slot_state, passes.k, self.source, self.before, self.running,
+                  solve.iterations, self.flag]  # fmt: skip
         self._launch(kernels.begin_kernel(precision, fluid.Params), pairs.count, inputs)
         with repeat(self.flag):
             passes.answer()
-            inputs = [self.begin, self.end, slots, self.source, passes.rate, passes.diagonal,
-                      self.before, self.residual, self.sums, self.flag]  # fmt: skip
+            inputs = [self.begin, self.end, pairs.fields["mass"], passes.k, self.source,
+                      passes.rate, passes.diagonal, self.before, self.residual, self.sums,
+                      self.flag]  # fmt: skip
             self._launch(kernels.residual_kernel(precision), len(self.begin), inputs)
             inputs = [self.edge, self.begin, self.end, fluid.params, self.sums, dt, solve.tolerance,
                       self.model.settings.pressure_iterations, self.first, self.omega, solve.error,
                       self.running, solve.iterations, self.flag]  # fmt: skip
             self._launch(kernels.decide_kernel(fluid.Params), worlds, inputs)
-            inputs = [pairs.pairs, self.running, self.omega, self.residual, passes.diagonal, slots,
-                      self.before]  # fmt: skip
+            inputs = [pairs.pairs, self.running, self.omega, self.residual, passes.diagonal,
+                      passes.k, self.before]  # fmt: skip
             self._launch(kernels.correct_kernel(precision), pairs.count, inputs)
-        inputs = [pairs.order, slots, passes.a, solve.found, self.k, self.b]
+        inputs = [pairs.order, passes.k, passes.a, solve.found, self.total, self.b]
         self._launch(motion.settle_kernel(precision), pairs.count, inputs)
 
     def _launch(self, kernel: wp.Kernel, rows: int, inputs: list[Any]) -> None:
