@@ -8,8 +8,8 @@ import numpy as np
 import warp as wp
 
 from ....engine.blocks import blocks
-from ....engine.execution.copies import copy, zero
-from ....engine.execution.launch import launch, repeat
+from ....engine.execution.copies import copy
+from ....engine.execution.launch import call, launch, repeat
 from ....engine.model import Model
 from ....engine.report import Solved
 from ....engine.state import State
@@ -94,8 +94,8 @@ class PressureSolver:
     def solve(self, state: State, dt: float) -> None:
         """Add the force of pressures to those that there are."""
         fluid, count, precision = self.fluid, self.fluid.pairs.count, self.model.precision
-        zero(self.model, self.total)
-        zero(self.model, self.b)
+        call(self.total.zero_)
+        call(self.b.zero_)
         self.passes.sum_diagonal()
         self._solve(self.divergence, state, 0.0, dt)
         self._solve(self.density, state, dt, dt)
