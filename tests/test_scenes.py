@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 import particlesim as ps
+from cases.ready import every
 from particlesim.commands.scene_files import ready_scenes
 
 NAMES = list(ready_scenes())
 SMALL = {
     "dam_break": {"spacing": 0.05},
     "star_collision": {"count": 150},
+    "sloshing_tank": {"spacing": 0.05},
     "sod_tube": {"count": 90},
     "sedov_blast": {"side": 10},
     "plummer_sphere": {"count": 300},
@@ -39,14 +41,14 @@ def simulate(name, frames, device, settings=None, **options):
 def test_the_ready_scenes_are_all_there():
     expected = (
         "bouncing_block chain dam_break freezing galaxy_collision gas_in_a_box lj_melt "
-        "molten_salt phase_transition pile plummer_sphere polymer_melt sedov_blast sod_tube "
-        "spring_lattice "
+        "molten_salt phase_transition pile plummer_sphere polymer_melt sedov_blast sloshing_tank "
+        "sod_tube spring_lattice "
         "star_collision three_body triple_pendulum wave_field"
     )
     assert set(expected.split()) <= set(NAMES)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", list(every()))
 def test_scene_runs(name, device):
     module, sim = simulate(name, 3, device)
     assert isinstance(module.settings, ps.Settings) and module.frames > 0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from particlesim.scenes import dam_break
+from particlesim.scenes import dam_break, sloshing_tank
 
 G = 9.81
 
@@ -67,3 +67,25 @@ def test_a_dam_break_keeps_its_density():
         sim.step()
         assert over(sim, fluid) < 1e-3
     assert all(each.missed[0] == 0 for each in fluid.iterated())
+
+
+def sloshing_error(spacing):
+    """Root mean square over a period, with steps as long as the particles' spacing allows."""
+    settings = sloshing_tank.settings.replace(substeps=round(0.1 / spacing))
+    sim = ps.Simulation(sloshing_tank.build(spacing=spacing), settings, device="cpu")
+    errors = []
+    for _ in range(71):
+        sim.step()
+        errors.append(sloshing_tank.error(sim))
+    return float(np.sqrt(np.mean(np.square(errors))))
+
+
+@pytest.mark.slow
+def test_water_sloshes_at_the_frequency_of_linear_waves():
+    """And the better the finer it is, by the first order at least.
+
+    What is left of a wave whose height is 0.1 / k is nonlinear by its square, 1 % or less.
+    """
+    coarse, fine = sloshing_error(0.025), sloshing_error(0.0125)
+    assert fine < 0.05
+    assert coarse / fine > 2.0

@@ -23,6 +23,7 @@ SMALL = {
     "phase_transition": {"cells": 4},
     "gas_in_a_box": {"count": 300},
     "polymer_melt": {"edge": 6},
+    "sloshing_tank": {"spacing": 0.05},
 }
 FRAMES = {"three_body": 20, "triple_pendulum": 20}
 

@@ -15,6 +15,7 @@ SCENES = list(ready_scenes())
 SMALL = {
     "dam_break": {"spacing": 0.05},
     "star_collision": {"count": 150},
+    "sloshing_tank": {"spacing": 0.05},
     "sod_tube": {"count": 90},
     "sedov_blast": {"side": 10},
     "plummer_sphere": {"count": 300},

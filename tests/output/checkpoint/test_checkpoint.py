@@ -12,11 +12,12 @@ import pytest
 import warp as wp
 
 import particlesim as ps
+from cases.ready import every
 
-from .checkpoints import SCENES, SMALL, described, pair, restart, ropes
+from .checkpoints import SMALL, described, pair, restart, ropes
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", list(every()))
 def test_a_restart_equals_the_uninterrupted_run(name, device, tmp_path):
     module = importlib.import_module(f"particlesim.scenes.{name}")
     options = SMALL.get(name, {})

@@ -82,14 +82,17 @@ class DFSPH(SPH):
             When a simulation is made, of another integrator.
 
     Example:
-        >>> from particlesim import Scene, Settings, Simulation, UniformGravity, sample
+        >>> from particlesim import PlaneBoundary, Scene, Settings, Simulation, UniformGravity
+        >>> from particlesim import sample
         >>> scene = Scene()
-        >>> block = sample.box((0, 0, 0), (1, 1, 1), spacing=0.1)
-        >>> water = scene.add_particles(block, mass=1000 * 0.1**3)
+        >>> block = sample.box((0, 0, 0), (0.6, 0.6, 0.6), spacing=0.1)
+        >>> water = scene.add_particles(block, mass=1000 * 0.1**3, radius=0.05)
         >>> fall = scene.add_interaction(UniformGravity((0, -9.81, 0)))
         >>> fluid = scene.add_interaction(DFSPH(water, smoothing_length=0.2, rest_density=1000.0))
-        >>> sim = Simulation(scene, Settings(dt=1 / 60, substeps=2), device="cpu")
-        >>> sim.step()
+        >>> floor = scene.add_constraint(PlaneBoundary((0, 0, 0), (0, 1, 0)))
+        >>> settings = Settings(dt=1 / 60, substeps=4, precision="float64")
+        >>> sim = Simulation(scene, settings, device="cpu")
+        >>> sim.run(6)
         >>> bool(sim.diagnostics().density_error < 1e-3)
         True
     """
