@@ -42,6 +42,7 @@ from .interactions.fluid.equations_of_state import (
     Polytrope,
     Tait,
 )
+from .interactions.fluid.incompressible.dfsph import DFSPH
 from .interactions.fluid.interfaces.surface_tension import SurfaceTension
 from .interactions.fluid.lengths import AdaptiveSmoothing
 from .interactions.fluid.smoothing.gaussian import Gaussian
@@ -87,6 +88,7 @@ from .scene.thermostat import Barostat, Thermostat
 from .simulation.simulation import Simulation
 
 __all__ = [
+    "DFSPH",
     "SPH",
     "XSPH",
     "AdaptiveSmoothing",

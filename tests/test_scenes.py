@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from cases.ready import small
+from cases.ready import every, small
 from particlesim.commands.scene_files import ready_scenes
 
 NAMES = list(ready_scenes())
@@ -26,13 +26,13 @@ def test_the_ready_scenes_are_all_there():
         "bouncing_block chain dam_break elastic_rings elliptical_drop floating_block freezing "
         "galaxy_collision gas_in_a_box hydrostatic_tank lj_melt molten_salt phase_transition "
         "pile plummer_sphere poiseuille polymer_melt polytrope rain_on_cloth rising_bubble "
-        "sedov_blast sod_tube spring_lattice standing_wave star_collision taylor_green "
-        "three_body toy_star triple_pendulum wave_field"
+        "sedov_blast sloshing_tank sod_tube spring_lattice standing_wave star_collision "
+        "taylor_green three_body toy_star triple_pendulum wave_field"
     )
     assert set(expected.split()) <= set(NAMES)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", list(every()))
 def test_scene_runs(name, device):
     module, sim = simulate(name, 3, device)
     assert isinstance(module.settings, ps.Settings) and module.frames > 0

@@ -93,7 +93,10 @@ class Converged(Judge):
     def _refining(self, plans: Sequence[Plan], given: dict[str, Any]) -> Refining:
         settings = [plan.settings for plan in plans]
         base, values = self.study.settings, dict(given)
-        constrained = any(scene.constraints for scene in self.study.scenes(plans[0].options))
+        constrained = any(
+            scene.constraints or any(part.answers for part in scene.interactions)
+            for scene in self.study.scenes(plans[0].options)
+        )
         finest = min(each.substep for each in settings)
         for name in sorted({*self.study.split(plans[0].values, "vary")[0]} - set(given)):
             different = {repr(plan.values[name]): plan.values[name] for plan in plans}

@@ -13,7 +13,8 @@ from ..kernels.instruments.watchdog import peak_kernel
 from ..scene.settings import Settings
 from .execution.acting import record_acts
 from .execution.executors import Executor
-from .execution.launch import Frame, Program, launch, owner, record
+from .execution.frame import Frame
+from .execution.launch import Program, launch, owner, record
 from .loop import Loop
 from .snapshot import Snapshot
 from .state import State

@@ -81,7 +81,7 @@ class Loop:
         self.neighbors.allocate(self.state)
         for part in self.parts:
             part.attach(model, self.state)
-        self.passes: Sequence[Interaction] = fuse(self.interactions)
+        self.passes = in_turn(fuse(self.interactions))
         self.observers = Observers()
         # Worlds that are not as the last evaluation of the forces, or the substep after it, left
         # them.
@@ -162,6 +162,12 @@ class Loop:
             raise validate.fail(
                 "Settings", "integrator", "be symplectic_euler in a scene with constraints", given,
                 "or leave the constraints out",
+            )  # fmt: skip
+        answers = [part.name for part in self.interactions if part.answers]
+        if answers and (moves.carries_forces or len(moves.stages) > 1):
+            raise validate.fail(
+                "Settings", "integrator", f"be symplectic_euler with {answers[0]}, whose force is "
+                "that of one whole kick", given, "or leave that out",
             )  # fmt: skip
         on_velocity = [part for part in self.interactions if part.depends_on_velocity]
         for part in [*on_velocity, *self.thermostats] if back else ():
@@ -270,6 +276,11 @@ class Loop:
         if name in LEFT_BY_FORCES and name in self.state:
             self.know_forces()
         return self.state.held(name)
+
+
+def in_turn(parts: Sequence[Interaction]) -> list[Interaction]:
+    """As they act: those that answer to the others come last."""
+    return sorted(parts, key=lambda each: each.answers)
 
 
 def _bound(parts: Sequence[Sequence[Any]]) -> list[Any]:

@@ -1,11 +1,13 @@
-"""Reports: results that show themselves as text, at a prompt and in notebooks."""
+"""Reports: results that show themselves as text, and what parts have to report of themselves."""
 
 from __future__ import annotations
 
 import html
 import io
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 
 class Report:
@@ -17,6 +19,24 @@ class Report:
     def _repr_html_(self) -> str:
         """Its text for notebooks, in columns that no narrow page breaks."""
         return f'<pre style="white-space: pre; overflow-x: auto">{html.escape(str(self))}</pre>'
+
+
+class Solved(NamedTuple):
+    """What somebody who iterates in every substep has come to, by world.
+
+    Args:
+        what: What the error is of.
+        error: Of the last substep, (worlds,).
+        iterations: That it took, (worlds,).
+        missed: The largest error of all substeps that ended above the tolerance; 0 where none did.
+        tolerance: Of the error.
+    """
+
+    what: str
+    error: np.ndarray
+    iterations: np.ndarray
+    missed: np.ndarray
+    tolerance: float
 
 
 def grid(heads: Iterable[tuple[str, Any]], rows: Iterable[Sequence[str]]) -> list[str]:

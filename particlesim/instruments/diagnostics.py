@@ -44,6 +44,10 @@ class Diagnostics(Report):
     ``substeps`` are those of the last frame, and ``limiter`` are the part and the kind of limit
     that they were chosen by, in words, (worlds,), the same for all worlds of a batch; no words
     where they are not adaptive.
+
+    ``density_error`` and ``divergence_error`` are what the last substep of a :class:`DFSPH` has
+    left, on average and in parts of the rest density, and ``pressure_iterations`` what it took for
+    both, (worlds,); not numbers and 0 in a scene without one.
     """
 
     mass: np.ndarray
@@ -57,6 +61,9 @@ class Diagnostics(Report):
     stress: np.ndarray
     substeps: np.ndarray
     limiter: np.ndarray
+    density_error: np.ndarray
+    divergence_error: np.ndarray
+    pressure_iterations: np.ndarray
 
     @property
     def energy(self) -> np.ndarray:
@@ -184,7 +191,21 @@ def _measure(sim: Source, forces: Source, potentials: list[np.ndarray] | None) -
         total[:, 0], total[:, 1:4], total[:, 4:7], total[:, 7], total[:, 8], total[:, 9], free,
         volume, matrices(total[:, 11:]) / known,
         np.full(model.world_count, sim.settings.substeps), np.full(model.world_count, limiter),
+        *_of_pressures(sim),
     )  # fmt: skip
+
+
+def _of_pressures(sim: Source) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Errors of density and of divergence, and iterations; of several fluids the most."""
+    worlds = sim.model.world_count
+    errors = {what: np.full(worlds, np.nan) for what in ("density", "divergence")}
+    iterations = np.zeros(worlds, dtype=int)
+    for part in sim.interactions:
+        found = part.iterated()
+        for each in found:
+            errors[each.what] = np.fmax(errors[each.what], each.error)
+        iterations = np.maximum(iterations, sum(each.iterations for each in found))
+    return errors["density"], errors["divergence"], iterations
 
 
 @contextlib.contextmanager

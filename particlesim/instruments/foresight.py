@@ -71,6 +71,8 @@ def look_ahead(loop: Loop, limits: list[Limit], share: float = 1.0) -> Ahead:
         share: Of the whole path: how far to look.
     """
     work = loop.work
+    if any(part.answers for part in loop.interactions):
+        return Ahead(None, math.inf)  # a force that is that of a whole step has no stiffness
     if not 0 < FEW * work <= WORK or not np.isfinite(loop.get("velocity")).all():
         return Ahead(None, math.inf)
     own, unknown = [Attributes(each) for each in loop.actors], set(loop.unknown_forces)

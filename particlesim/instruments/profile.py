@@ -17,7 +17,8 @@ from typing import Any
 import warp as wp
 
 from ..engine.execution.executors import available_threads
-from ..engine.execution.launch import CHUNK, Frame, Host, Launch, Program, When
+from ..engine.execution.frame import Frame
+from ..engine.execution.launch import CHUNK, Host, Launch, Program, When, While
 from ..engine.execution.threads import Chain, Team
 from ..engine.frames import Frames
 from ..engine.loop import Loop
@@ -226,13 +227,16 @@ class Clocked:
 
     def _conditional(self, operation: When, owner: str, users: str | None) -> Callable[[], None]:
         steps = self._steps(operation.body, owner, inside=True)
+        again = isinstance(operation, While)
 
         def step() -> None:
-            if operation.flag.numpy()[0]:
+            while operation.flag.numpy()[0]:
                 if users is not None:
                     self.profile.builds[users] += 1
                 for each in steps:
                     each()
+                if not again:
+                    break
 
         return step
 

@@ -168,6 +168,9 @@ class Interaction(Part):
     # Adds its force to ``implicit_force`` too, where that is kept, df/dv to ``force_slope``, and
     # has ``follow``.
     implicit: bool = False
+    # It answers to the force of all the others, and so comes last. It makes a kick of one step
+    # right: only symplectic_euler takes it.
+    answers: bool = False
 
     @property
     def depends_on_velocity(self) -> bool:
@@ -189,6 +192,10 @@ class Interaction(Part):
 
     def carried(self) -> list[Any]:
         """The arrays that ``carry`` writes, a row for each particle."""
+        return []
+
+    def iterated(self) -> list[Any]:
+        """A :class:`~particlesim.engine.report.Solved` for all that it iterates in a substep."""
         return []
 
     def presses(self, wall: Part) -> Any:

@@ -51,6 +51,11 @@ class Settings:
         opening_angle: Gravity is summed by a tree, whose cells act as a whole where they are seen
             under at most this angle, their radius over their distance; from 0 (none do) to 1. 0.5
             is a good choice (see :class:`particlesim.Gravity`). None: over all pairs.
+        density_tolerance: By how much the density of a :class:`particlesim.DFSPH` may exceed its
+            rest density, on average and as foreseen for the end of a substep, in parts of it.
+        divergence_tolerance: By how much its flow may still compress it in a substep, likewise.
+            What is left of both swings, and pressures with it: 1e-5 quiets them.
+        pressure_iterations: Corrections of its pressures in a substep, at most, for each of these.
         compensated: Carry the rounding error of positions and velocities along (Kahan 1965), so
             that neither freezes where an increment is below the last bit.
         relaxation: Factor on averaged (Jacobi) contact corrections, above 0, at most 1: more would
@@ -89,6 +94,9 @@ class Settings:
     integrator: str | type = "symplectic_euler"
     precision: str = "float32"
     skin: float | None = None
+    density_tolerance: float = 3e-4
+    divergence_tolerance: float = 1e-4
+    pressure_iterations: int = 100
     compensated: bool = True
     relaxation: float = 1.0
     depenetration_speed: float | None = None
@@ -113,6 +121,13 @@ class Settings:
             if self.safety is None
             else validate.number(owner, "safety", self.safety, above=0.0, maximum=1.0),
             "iterations": validate.whole(owner, "iterations", self.iterations, minimum=1),
+            "pressure_iterations": validate.whole(
+                owner, "pressure_iterations", self.pressure_iterations, minimum=1
+            ),
+            **{
+                name: validate.number(owner, name, getattr(self, name), above=0.0)
+                for name in ("density_tolerance", "divergence_tolerance")
+            },
             "retries": validate.whole(owner, "retries", self.retries, minimum=1),
             "energy_growth": validate.number(owner, "energy_growth", self.energy_growth, above=1.0),
             "relaxation": validate.number(

@@ -119,6 +119,7 @@ class Simulation(Reading):
         rounds = self.rounds
         if not self.settings.watchdog:
             return
+        rounds.listen()
         if rounds.made < 0 if first else rounds.due(self.watchdog.hurried):
             rounds.make()
             self.watchdog.forget()

@@ -132,6 +132,7 @@ KIN = {
     "ElasticSolid": "Springs",
     "HarmonicBonds": "Springs", "FENEBonds": "Bonds", "HarmonicAngles": "Angles",
     "Mie": "LennardJones", "Yukawa": "PairPotential", "Morse": "PairPotential",
+    "DFSPH": "SPH",
     "SoftSphere": "PairPotential", "Coulomb": "PairPotential", "Electrostatics": "PairPotential",
 }  # fmt: skip
 # To a grid, which rests in the frame that it is made in, and to groups of several fluids.
@@ -141,8 +142,10 @@ BOUND = ("FieldForce", "SurfaceTension")
 NU = Quantity(0.1, (2, 0, -1))
 
 
-def fluid_parts(frame):
+def fluid_parts(name, frame):
     """The parts of a fluid, which are objects of their own."""
+    if name == "DFSPH":
+        return {"viscosity": [ps.LaminarViscosity(frame.of(NU))]}
     speed = frame.of(Quantity(3.0, (1, 0, -1)))
     return {
         "equation_of_state": ps.Tait(sound_speed=speed),
@@ -178,8 +181,8 @@ def arguments(name, frame):
             given["law"], extra = LAWS[name]
         elif key in PLAIN:
             given[key] = PLAIN[key]
-        elif key in fluid_parts(frame):
-            given[key] = fluid_parts(frame)[key]
+        elif key in fluid_parts(name, frame):
+            given[key] = fluid_parts(name, frame)[key]
         elif not {key, (name, key)} & LEFT_OUT and parameter.kind is not parameter.VAR_KEYWORD:
             given[key] = frame.of(quantity(name, key))
     if "lower" in given:  # corners are turned, and the box is then named by its new ones
@@ -204,7 +207,7 @@ def along_pairs(name, frame):
     """A part by its name; of viscosities that which acts along pairs alone."""
     given = arguments(name, frame)
     if "viscosity" in given:
-        given["viscosity"] = given["viscosity"][0]
+        given["viscosity"] = [each for each in given["viscosity"] if "term" in each.laws]
     return kinds()[name](**given)
 
 

@@ -10,7 +10,8 @@ import warp as wp
 import particlesim as ps
 from particlesim.engine.execution import launch
 from particlesim.engine.execution.executors import EagerExecutor, GraphExecutor, ThreadExecutor
-from particlesim.engine.execution.launch import CHUNK, Frame, Launch, Program, When
+from particlesim.engine.execution.frame import Frame
+from particlesim.engine.execution.launch import CHUNK, Launch, Program, When
 from particlesim.engine.execution.threads import Chain, Team
 
 WAYS = [("graph", None), ("threads", 1), ("threads", 2), ("threads", 3), ("auto", 2)]

@@ -66,6 +66,7 @@ PARTS = {
     ps.FENEBonds: {"pairs": [(0, 1)], "stiffness": 30.0, "length": 1.5},
     ps.Gravity: {"G": 1.0, "softening": 0.1, "method": "particle_mesh_ewald", "cutoff": 2.0,
                  "tolerance": 1e-5},
+    ps.DFSPH: {"smoothing_length": 0.1, "rest_density": 1.0},
     ps.HarmonicAngles: {"triples": [(0, 1, 2)], "stiffness": 1.0, "rest_angle": 2.0},
     ps.HarmonicBonds: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0},
     ps.IdealGas: {"gamma": 1.4},

@@ -134,7 +134,7 @@ def test_looking_changes_nothing(name, tmp_path):
     np.testing.assert_array_equal(watched.get("velocity"), plain.get("velocity"))
 
 
-DAMPED = ("Drag", "ElasticSolid", "SPH", "Springs", "ConstraintForce", "HertzianGrains")
+DAMPED = ("DFSPH", "Drag", "ElasticSolid", "SPH", "Springs", "ConstraintForce", "HertzianGrains")
 REVERSIBLE = [name for name in FORCES if name not in DAMPED]
 
 

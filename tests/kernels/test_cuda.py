@@ -165,6 +165,7 @@ def constrained(periodic, *, breaks, bounces):
     touch = {"friction": 0.1, "restitution": 0.5} if bounces else {}
     scene.add_constraint(ps.Contact(**touch))
     if periodic is None:
+        scene.add_interaction(ps.DFSPH(smoothing_length=1.0, rest_density=1.0))
         scene.add_constraint(ps.PlaneBoundary((0, -9, 0), (0, 1, 0), **touch))
         scene.add_constraint(ps.BoxBoundary((-9, -9, -9), (20, 20, 20), **touch))
         scene.add_constraint(ps.SphereBoundary((0, 0, 0), 30.0, velocity=(1, 0, 0), **touch))

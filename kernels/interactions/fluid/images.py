@@ -51,7 +51,7 @@ def density_term(
     lines = [*seen.read("D=wall"), "found = weight(wp.sqrt(r2) * p.inverse_h)", *_weights(seen)]
     names = {"weight": weight, "mass": reader(precision)}
     sums = "mass(d.m, j) * found"
-    return _term("add_images", lines, sums, 1, seen, names, precision, data, params)
+    return term_of("add_images", lines, sums, 1, seen, names, precision, data, params)
 
 
 @functools.cache
@@ -62,7 +62,7 @@ def own_weight(
     lines = ["j = i", *seen.read("D=wall"), "r2 = real(0.0)", "found = weight(r2)"]
     lines += _weights(seen)
     header, names = "own(i: int, d: Data, p: Params)", {"weight": weight}
-    return _function(header, lines, "found", seen, names, precision, data, params)
+    return function_of(header, lines, "found", seen, names, precision, data, params)
 
 
 def force_term(
@@ -85,10 +85,10 @@ def force_term(
         "apart = r2 > p.closest_squared",
         "side = wp.where(d.slot[i] < d.slot[j], -p.smoothing_length, p.smoothing_length)",
         "distance2 = wp.where(apart, r2, p.smoothing_length * p.smoothing_length)",
-        *_pair(seen),
+        *pair_lines(seen),
         "g = pull(i, j, approach, distance2, d, p)",
         "aside = direction * wp.where(apart, real(0.0), side * g)",
-        *_pulls(seen, "j", "real(2.0) * D_j[{a}]", ["g += g{n}"]),
+        *pull_lines(seen, "j", "real(2.0) * D_j[{a}]", ["g += g{n}"]),
         "f = x_ij * g + aside",
     ]
     if dragged is not None:
@@ -96,14 +96,14 @@ def force_term(
     sums = ", ".join([*(f"f[{c}]" for c in range(3)), *(f"b{a}" for a in range(seen.places))])
     names = {"pull": pull, "dragged": dragged, "direction": precision.vec3(*direction)}
     width = 3 + seen.places
-    return _term("push_images", lines, sums, width, seen, names, precision, data, params)
+    return term_of("push_images", lines, sums, width, seen, names, precision, data, params)
 
 
 def press_term(pull: wp.Function, seen: Seen, precision: Precision, data: Any, params: Any) -> Term:
     """Term of (d_ia + d_ja) w by place: what the images of a pair have along a wall's normal."""
-    lines = [*_pair(seen), *_pulls(seen, "j", "(D_i[{a}] + D_j[{a}])", [])]
+    lines = [*pair_lines(seen), *pull_lines(seen, "j", "(D_i[{a}] + D_j[{a}])", [])]
     sums, names = ", ".join(f"b{a}" for a in range(seen.total)), {"pull": pull}
-    return _term("press", lines, sums, seen.total, seen, names, precision, data, params)
+    return term_of("press", lines, sums, seen.total, seen, names, precision, data, params)
 
 
 @functools.cache
@@ -112,18 +112,18 @@ def own_push(
     params: Any,
 ) -> wp.Function:  # fmt: skip
     """``own(i, d, p)``: the term of forces over the images of a particle of itself."""
-    lines = ["j = i", "x_ij = vec3()", "r2 = real(0.0)", *_pair(seen)]
-    lines += [*_pulls(seen, "i", "real(2.0) * D_i[{a}]", []), "f = vec3()"]
+    lines = ["j = i", "x_ij = vec3()", "r2 = real(0.0)", *pair_lines(seen)]
+    lines += [*pull_lines(seen, "i", "real(2.0) * D_i[{a}]", []), "f = vec3()"]
     if dragged is not None:
         lines += _drags(seen, "i")
     numbers = [*(f"f[{c}]" for c in range(3)), *(f"b{a}" for a in range(seen.places))]
     result = f"sums({', '.join(numbers)})"
     names = {"pull": pull, "dragged": dragged, "sums": precision.vector(3 + seen.places)}
     header = "own(i: int, d: Data, p: Params)"
-    return _function(header, lines, result, seen, names, precision, data, params)
+    return function_of(header, lines, result, seen, names, precision, data, params)
 
 
-def _pair(seen: Seen) -> list[str]:
+def pair_lines(seen: Seen) -> list[str]:
     """Source of how far walls are from both particles, and of how fast these approach."""
     if seen.sticky is None:
         return [*seen.read("D=wall"), "approach = real(0.0)"]
@@ -163,7 +163,7 @@ def _approach(each: tuple[int, ...], sticky: tuple[bool, ...]) -> str:
     return " + ".join(terms)
 
 
-def _pulls(seen: Seen, j: str, arm: str, also: list[str]) -> list[str]:
+def pull_lines(seen: Seen, j: str, arm: str, also: list[str]) -> list[str]:
     """Source of w of every image, which b of each of its places takes up along an ``arm``."""
     lines = [*_squares(seen), *(f"b{a} = real(0.0)" for a in range(seen.places))]
     for n, each in enumerate(seen.sets):
@@ -175,17 +175,17 @@ def _pulls(seen: Seen, j: str, arm: str, also: list[str]) -> list[str]:
     return lines
 
 
-def _term(
+def term_of(
     name: str, lines: list[str], sums: str, width: int, seen: Seen, names: dict[str, Any],
     precision: Precision, data: Any, params: Any,
 ) -> Term:  # fmt: skip
     header = f"{name}(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: Params)"
     names = {**names, "sums": precision.vector(width)}
-    made = _function(header, lines, f"sums({sums})", seen, names, precision, data, params)
+    made = function_of(header, lines, f"sums({sums})", seen, names, precision, data, params)
     return Term(made, width, rounding="fused")
 
 
-def _function(
+def function_of(
     header: str, lines: list[str], result: str, seen: Seen, names: dict[str, Any],
     precision: Precision, data: Any, params: Any,
 ) -> wp.Function:  # fmt: skip

@@ -28,7 +28,7 @@ def ladders(study: Study, given: Mapping[str, Iterable[Any]]) -> tuple[Ladder, l
     found: Ladder = {"precision": first(settings.precision, PRECISIONS)}
     if sim.constraints:
         found["iterations"] = first(settings.iterations, ITERATIONS)
-    else:
+    elif not any(part.answers for part in sim.interactions):
         found["integrator"] = first(settings.integrator, INTEGRATORS)
     polish: Ladder = {}
     if sim.neighbors.verlet:

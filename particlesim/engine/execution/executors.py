@@ -12,7 +12,8 @@ import warp as wp
 
 from ...kernels.warp_internals import part_captures
 from ...scene.settings import Settings
-from .launch import CHUNK, Frame, Launch, Program, When, Whole
+from .frame import Frame
+from .launch import CHUNK, Launch, Program, When, While, Whole
 from .threads import Chain, Team
 
 LARGEST_GRAPH = 4096  # operations
@@ -111,7 +112,8 @@ def _steps(program: Program, team: Team, threads: int) -> list[Callable[[], None
             steps.append(_Run(launches, team, threads).run)
             launches = []
         if isinstance(operation, When):
-            steps.append(_If(operation.flag, _steps(operation.body, team, threads)).run)
+            inside = _If(operation.flag, _steps(operation.body, team, threads))
+            steps.append(inside.again if isinstance(operation, While) else inside.run)
         elif isinstance(operation, Whole):
             steps.append(operation.record()[0].launch)
         else:
@@ -156,6 +158,11 @@ class _If:
         if self.flag[0]:
             for step in self.steps:
                 step()
+
+    def again(self) -> None:
+        """Until the flag is unset."""
+        while self.flag[0]:
+            self.run()
 
 
 AnyExecutor = GraphExecutor | EagerExecutor | ThreadExecutor

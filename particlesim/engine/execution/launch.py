@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any
@@ -102,6 +102,13 @@ class When:
 
     def issue(self) -> None:
         wp.capture_if(self.flag, on_true=self.body.issue)
+
+
+class While(When):
+    """A part that runs again and again for as long as its flag is set, which it unsets itself."""
+
+    def issue(self) -> None:
+        wp.capture_while(self.flag, self.body.issue)
 
 
 @dataclass
@@ -253,44 +260,18 @@ def call(function: Callable[[], None]) -> None:
 
 
 @contextmanager
-def when(flag: wp.array) -> Iterator[None]:
+def when(flag: wp.array, kind: type[When] = When) -> Iterator[None]:
     """Run what is launched inside only if ``flag`` (one int32 on the device) is not zero."""
     body = Program()
     with record(body):
         yield
-    program = _program.get()
+    program, operation = _program.get(), kind(flag, body)
     if program is not None:
-        program.add(When(flag, body))
-    elif flag.numpy()[0]:
-        body.issue()
+        program.add(operation)
+    else:
+        operation.issue()
 
 
-@dataclass
-class Frame:
-    """What a frame does: its start, its substep ``repeat`` times, and its end."""
-
-    repeat: int
-    before: Program = field(default_factory=Program)
-    substep: Program = field(default_factory=Program)
-    after: Program = field(default_factory=Program)
-
-    @property
-    def largest(self) -> int:
-        """Rows of the largest launch."""
-        return max((each.dim for part in self.parts for each in part.launches()), default=0)
-
-    @property
-    def parts(self) -> tuple[Program, Program, Program]:
-        """The three programs."""
-        return self.before, self.substep, self.after
-
-    @property
-    def host(self) -> list[Host]:
-        """What keeps it from being a graph."""
-        return [each for part in self.parts for each in part.operations if isinstance(each, Host)]
-
-    def load(self) -> None:
-        """Compile and load every kernel now rather than in the middle of a capture."""
-        for part in self.parts:
-            for operation in part.launches():
-                operation.record()
+def repeat(flag: wp.array) -> AbstractContextManager[None]:
+    """Run what is launched inside again and again, until ``flag`` is zero, as it makes it."""
+    return when(flag, While)

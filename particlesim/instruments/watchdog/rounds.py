@@ -84,6 +84,20 @@ class Rounds:
         most = SHARE * (ROUND + 3.0 * work) / (settings.substeps * (SUBSTEP + work))
         self.next = loop.frame + max(1, min(max(loop.frame, FIRST), int(most) + 1))
 
+    def listen(self) -> None:
+        """Tell of iterations that have ended before they were done, in any substep since."""
+        settings = self.loop.settings
+        for part in self.loop.interactions:
+            for each in part.iterated():
+                for w in np.nonzero(each.missed > 0)[0].tolist():
+                    self._tell(
+                        (id(part), each.what), w,
+                        f"{part.name} must come to a {each.what} error of {each.tolerance:g} on "
+                        f"average, got {each.missed[w]:.3g} after {settings.pressure_iterations} "
+                        "iterations",
+                        f"use more substeps than {settings.substeps}, or pressure_iterations",
+                    )  # fmt: skip
+
     def _limits(self) -> None:
         """Asked again where the motion has become faster, or stronger; at the start by the run."""
         state, model = self.loop.state, self.loop.model

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ...engine.frames import Frames
-from ...engine.loop import Loop
+from ...engine.loop import Loop, in_turn
 from ...engine.observers import FOLLOW, FORCE, Observer
 from .limits import FAST, FINITE, Limits
 
@@ -93,7 +93,7 @@ def trace(frames: Frames, limits: Limits, culprits: list[Culprit], substeps: int
         if not now:
             loop.substep(dt)
             continue
-        fused, loop.passes = loop.passes, loop.interactions  # one by one
+        fused, loop.passes = loop.passes, in_turn(loop.interactions)  # one by one
         with loop.observers.watching(_Look(loop, now, dt)):
             loop.substep(dt)
         loop.passes = fused

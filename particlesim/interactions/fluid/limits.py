@@ -46,13 +46,25 @@ def fluid_limits(part: Any, probe: Probe) -> list[Limit]:
     if c[k] > 0 and (advised := ADVISED * h[k] / c[k]) < dt:
         reason += f"; for accuracy {ADVISED} h / c = {advised:.3g} s is advised"
     limits = [Limit(part.name, "sound", dt, reason, *probe.place(int(rows[k])))]
-    a = np.linalg.norm(probe.acceleration[rows], axis=1)
+    return (
+        limits
+        + acceleration_limit(part, probe, h, probe.acceleration[rows])
+        + _speed_limit(part, probe, h)
+        + _shifting_limit(part, probe, each)
+    )
+
+
+def acceleration_limit(
+    part: Any, probe: Probe, h: np.ndarray, acceleration: np.ndarray
+) -> list[Limit]:
+    """0.25 sqrt(h / |a|), with the smoothing length and the acceleration of every member."""
+    rows, a = part.pairs.members_host, np.linalg.norm(acceleration, axis=1)
     k = int(np.argmax(a / h))
-    if a[k] > 0:
-        reason = f"0.25 sqrt(h / a), h = {h[k]:.4g}, a = {a[k]:.4g}"
-        dt = ACCELERATION * float(np.sqrt(h[k] / a[k]))
-        limits.append(Limit(part.name, "acceleration", dt, reason, *probe.place(int(rows[k]))))
-    return limits + _speed_limit(part, probe, h) + _shifting_limit(part, probe, each)
+    if a[k] == 0:
+        return []
+    reason = f"0.25 sqrt(h / a), h = {h[k]:.4g}, a = {a[k]:.4g}"
+    dt = ACCELERATION * float(np.sqrt(h[k] / a[k]))
+    return [Limit(part.name, "acceleration", dt, reason, *probe.place(int(rows[k])))]
 
 
 def _speed_limit(part: Any, probe: Probe, h: np.ndarray) -> list[Limit]:

@@ -40,6 +40,11 @@ class Passes(Evolving):
     parameters: dict[str, Any]
     sources: dict[str, dict[str, str]]
 
+    @property
+    def moving(self) -> bool:
+        """How fast a pair approaches counts."""
+        return bool(self.viscosity)
+
     def variables(self, name: str) -> tuple[str, ...]:
         """What a law is called with."""
         raise NotImplementedError
@@ -47,7 +52,7 @@ class Passes(Evolving):
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
         columns = self.columns(self.parameters)
-        read = {"velocity": bool(self.viscosity), ENERGY: self.hot}
+        read = {"velocity": self.moving, ENERGY: self.hot}
         names = {"mass"} | {name for name, on in read.items() if on}
         if self.adaptive is None:
             self.pairs = cast(VerletList, neighbors.of(self, names))  # as there is a cutoff
@@ -85,7 +90,7 @@ class Passes(Evolving):
         # Mass, density, P / rho^2 and sound speed of each slot, together as they are read together.
         self.slot_state = self.pairs.array(precision.vector(4))
         fields = {"x": held["position"], "state": self.slot_state, **self.fluids.read(held["mass"])}
-        if self.viscosity:
+        if self.moving:
             fields["v"] = held["velocity"]
         if self.hot:
             fields["u"] = held[ENERGY]
@@ -117,8 +122,7 @@ class Passes(Evolving):
             heat = functools.partial(kernels.heat_term, *given)
             self.density_term = kernels.density_term(self.weight, *types)
             pull, dragged = self.pull(*types), self.dragged(*types)
-            moving = bool(self.viscosity)
-            self.force_term = kernels.force_term(pull, dragged, moving, self.dimension, *types)
+            self.force_term = kernels.force_term(pull, dragged, self.moving, self.dimension, *types)
         if self.hot:
             self.heat = Heat(self, self.state, heat)
         if self.lengths is not None:
@@ -150,10 +154,14 @@ class Passes(Evolving):
 
     def apply(self, state: State, neighbors: Neighbors, dt: float) -> None:
         self.sum_density(state)
-        out = {"f": state.force}
-        self.walls.sum_force(Pass(self.loop, self.force_term, kernels.add_force, out))
+        self.sum_force(state)
         if self.drift:
             self.drift.sum()
+
+    def sum_force(self, state: State) -> None:
+        """The forces of pairs, at the densities summed last."""
+        out = {"f": state.force}
+        self.walls.sum_force(Pass(self.loop, self.force_term, kernels.add_force, out))
 
     def advance(self, state: State, dt: float) -> None:
         super().advance(state, dt)

@@ -180,7 +180,7 @@ class Walls:
             Pass(self.loop, term, functools.partial(keep_state, own, *laws), plain.out)
             for term, own in zip(self.density_terms, self.own_weights, strict=True)
         ]
-        self._sum(plain, *beside)
+        self.sum(plain, *beside)
 
     def sum_force(self, plain: Pass) -> None:
         """The pass of forces, of which ``plain`` is that far from walls."""
@@ -192,7 +192,7 @@ class Walls:
             Pass(self.loop, term, functools.partial(images.add_force, own, seen), out)
             for term, own, seen in zip(self.force_terms, self.own_pushes, self.ways, strict=True)
         ]
-        self._sum(plain, *beside)
+        self.sum(plain, *beside)
 
     def pressed(self, part: Part) -> np.ndarray | None:
         """What the fluid exerts on a boundary, (worlds, 3), at the last densities; None: nothing.
@@ -214,7 +214,8 @@ class Walls:
             return -np.stack([force[begin:end].sum(axis=0) for begin, end in edges])
         return None
 
-    def _sum(self, plain: Pass, *beside: Pass) -> None:
+    def sum(self, plain: Pass, *beside: Pass) -> None:
+        """A pass over pairs; ``beside``: beside one wall, and beside several."""
         model, pairs, made = self.model, self.fluid.pairs, []
         for loop, term, store, out in (plain, *beside):
             Out = structure_of("PairSums", out)

@@ -1,0 +1,1 @@
+"""Fluids whose pressures are sought, and do not follow from their density."""
