@@ -11,7 +11,7 @@ import numpy as np
 import particlesim as ps
 
 frames = 120
-settings = ps.Settings(dt=1 / 60, substeps=4, divergence_tolerance=1e-5)
+settings = ps.Settings(dt=1 / 60, substeps=4)
 GRAVITY = 9.81
 
 

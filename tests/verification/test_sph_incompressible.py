@@ -32,7 +32,7 @@ def test_tank_at_rest_in_a_box(across):
     )
     scene.add_interaction(fluid)
     tank = scene.add_constraint(ps.BoxBoundary((0, 0, 0), (0.5, 2, 0.5)))
-    settings = ps.Settings(dt=1 / 150, divergence_tolerance=1e-5, substeps=across // 10)
+    settings = ps.Settings(dt=1 / 150, substeps=across // 10)
     sim = ps.Simulation(scene, settings, device="cpu")
     sim.run(225)
     early = sim.diagnostics().kinetic[0]

@@ -47,10 +47,10 @@ class SPH(Passes):
 
         F_ij = -(P_i/n_i^2 + P_j/n_j^2 + m_i m_j Pi_ij) grad_i W_ij        (n = rho/m)
 
-    is the gradient of the energy again (Hu and Adams 2006, eqs. 7 and 13; Solenthaler and Pajarola
-    2008): of equal masses the same. All are to start at one spacing. A light fluid next to a heavy
-    one feels the other's stiffness, and the step is that of c = sqrt(rho_1 c_1^2 / rho_2): choose
-    sounds that make rho c^2 alike, or less in the light one, above its pressure by a hundred times.
+    is the gradient of the energy again (Hu and Adams 2006; Solenthaler and Pajarola 2008): of equal
+    masses the same. All are to start at one spacing. A light fluid next to a heavy one feels the
+    other's stiffness, and the step is that of c = sqrt(rho_1 c_1^2 / rho_2): choose sounds that
+    make rho c^2 alike, or less in the light one, above its pressure by a hundred times.
 
     Over particles of mass rho0 s^d on a square lattice of spacing s the sum is a little more
     than rho0. A fluid that starts there rests there: its equation of state is given the sum for

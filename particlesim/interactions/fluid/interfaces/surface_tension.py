@@ -31,10 +31,10 @@ class SurfaceTension(Interaction):
 
     is the divergence of the stress of a surface that is smoothed by W: g is the slope of a colour
     that is 1 in one fluid and 0 in the others, whose size integrates to 1 across the surface
-    (Lafaurie et al. 1994; Hu and Adams 2006, eqs. 17 to 20, here without their isotropic part). It
-    needs no curvature and knows no densities, only numbers n: a ratio of 1000 is as good as 1. The
-    momentum is conserved to round-off. The force is no gradient: that of sigma times the area as
-    particles count it would have them part along the surface. Diagnostics count this energy.
+    (Lafaurie et al. 1994; Hu and Adams 2006, here without their isotropic part). It needs no
+    curvature and knows no densities, only numbers n: a ratio of 1000 is as good as 1. The momentum
+    is conserved to round-off. The force is no gradient: that of sigma times the area as particles
+    count it would have them part along the surface. Diagnostics count this energy.
 
     Pulled along the surface by more than it is pressed, fluid would clump there: the pressure must
     stay well above 0.7 sigma / h, everywhere around. Depth sees to that; in a closed or periodic
@@ -43,11 +43,11 @@ class SurfaceTension(Interaction):
 
     A surface is some 2 h thick. Measured at h = 2 spacings on drops that are 10 and 20 spacings in
     radius: the pressure in them is sigma / R (in the plane) within 2 and 1 %, and they swing 7 and
-    2 % too slowly. A film thinner than 4 h is pulled too little. At a wall a surface stands at
-    right angles.
+    2 % too slowly. A film thinner than 4 h is pulled too little. Walls are not seen: next to
+    one there is no angle of contact that could be given.
 
     The step is bounded by capillary waves, dt < sqrt(rho h^3 / (2 pi sigma)) with rho the lightest
-    fluid's (Brackbill, Kothe and Zemach 1992, eq. 61, where it is the mean of both).
+    fluid's (Brackbill, Kothe and Zemach 1992, where it is the mean of both).
 
     Args:
         fluid: An ``SPH`` of several fluids, with one smoothing length, in 2 or 3 dimensions. Its
