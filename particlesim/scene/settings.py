@@ -134,26 +134,7 @@ class Settings:
                 owner, "relaxation", self.relaxation, above=0.0, maximum=1.0
             ),
         }
-        left_open = {"dt": _is(self.dt, AUTO), "substeps": _is(self.substeps, AUTO, ADAPTIVE)}
-        chosen = [name for name, is_open in left_open.items() if is_open]
-        if len(chosen) == 2:
-            raise validate.fail(
-                owner,
-                "substeps",
-                'be a number with dt="auto"',
-                self.substeps,
-                "choose one of them",
-            )
-        if "dt" not in chosen:
-            checked["dt"] = validate.number(owner, "dt", self.dt, minimum=0.0, unit="s")
-        if "substeps" not in chosen:
-            checked["substeps"] = validate.whole(owner, "substeps", self.substeps, minimum=1)
-        if self.most_substeps is not None:
-            least = checked.get("substeps", 1)
-            most = validate.whole(owner, "most_substeps", self.most_substeps, minimum=least)
-            checked["most_substeps"] = most
-        elif _is(self.substeps, ADAPTIVE):
-            checked["most_substeps"] = MOST
+        checked |= self._steps()
         if not isinstance(self.integrator, type):
             validate.choice(owner, "integrator", self.integrator, INTEGRATORS)
         validate.choice(owner, "precision", self.precision, PRECISIONS)
@@ -177,6 +158,31 @@ class Settings:
                 raise validate.fail(owner, name, "be True or False", value, "choose one")
         for name, value in checked.items():  # plain numbers, whatever kind was given
             object.__setattr__(self, name, value)
+
+    def _steps(self) -> dict[str, Any]:
+        """dt and the numbers of substeps, checked, where they are numbers."""
+        owner, checked = "Settings", dict[str, Any]()
+        left_open = {"dt": _is(self.dt, AUTO), "substeps": _is(self.substeps, AUTO, ADAPTIVE)}
+        chosen = [name for name, is_open in left_open.items() if is_open]
+        if len(chosen) == 2:
+            raise validate.fail(
+                owner,
+                "substeps",
+                'be a number with dt="auto"',
+                self.substeps,
+                "choose one of them",
+            )
+        if "dt" not in chosen:
+            checked["dt"] = validate.number(owner, "dt", self.dt, minimum=0.0, unit="s")
+        if "substeps" not in chosen:
+            checked["substeps"] = validate.whole(owner, "substeps", self.substeps, minimum=1)
+        if self.most_substeps is not None:
+            least = checked.get("substeps", 1)
+            most = validate.whole(owner, "most_substeps", self.most_substeps, minimum=least)
+            checked["most_substeps"] = most
+        elif _is(self.substeps, ADAPTIVE):
+            checked["most_substeps"] = MOST
+        return checked
 
     @property
     def automatic(self) -> bool:

@@ -1,0 +1,198 @@
+"""Scenes whose simulations launch every kernel, at least in one variant."""
+
+import numpy as np
+import warp as wp
+
+import particlesim as ps
+from particlesim.commands.scene_files import load_scene, ready_scenes
+
+
+@ps.law
+def screened(r: float, charge_i: float, charge_j: float, screening: float, power: int):
+    return charge_i * charge_j * wp.exp(-r / screening) * wp.pow(r, float(power))
+
+
+@ps.law
+def repel(r: float, mass_j: float, radius_i: float, spin_j: wp.vec3):
+    return mass_j * radius_i * spin_j[0] / r
+
+
+@ps.law
+def swing(position: wp.vec3, velocity: wp.vec3, time: float, axis: wp.vec3):
+    return wp.cross(axis, velocity) - wp.sin(time) * position
+
+
+@ps.law
+def swing_energy(position: wp.vec3):
+    return 0.5 * wp.dot(position, position)
+
+
+@ps.law
+def morse(distance_squared: float, charge_i: float, depth: float):
+    x = 1.0 - wp.exp(1.0 - distance_squared)
+    return charge_i * depth * x * x
+
+
+@ps.law
+def wave(cosine: float, depth: float):
+    return depth * cosine * cosine
+
+
+@ps.law
+def torsion(dihedral: float, multiplicity: int):
+    return wp.cos(float(multiplicity) * dihedral)
+
+
+@ps.law
+def bell(q: float):
+    s = wp.max(1.0 - 0.5 * q, 0.0)
+    return s * s * s * s * (1.0 + 2.0 * q)
+
+
+class Bell(ps.SmoothingFunction):
+    weight = bell
+
+
+@ps.law
+def flat(a: wp.vec3, b: wp.vec3, c: wp.vec3, area: float):
+    return 0.5 * wp.length(wp.cross(b - a, c - a)) - area
+
+
+def particles(count=600, periodic=None, **attributes):
+    scene = ps.Scene(periodic=periodic)
+    x = np.random.default_rng(0).uniform(0, 10, (count, 3))
+    scene.add_particles(x, radius=0.1, charge=1.0, spin=[(0, 0, 1)] * len(x), **attributes)
+    return scene
+
+
+def forces():
+    scene = particles()
+    some = range(0, 600, 2)
+    scene.add_interaction(ps.LennardJones())
+    scene.add_interaction(ps.LennardJones(some, cutoff=2.5))
+    scene.add_interaction(ps.PairPotential(screened, cutoff=2.4, screening=1.0, power=2))
+    scene.add_interaction(ps.PairForce(repel, cutoff=1.0))
+    scene.add_interaction(ps.PairPotential(screened, cutoff=None, screening=1.0, power=-1))
+    scene.add_interaction(ps.Gravity(some))
+    scene.add_interaction(ps.Springs([(0, 1)], 1.0, 1.0))
+    scene.add_interaction(ps.Bonds([(0, 1)], morse, depth=1.0))
+    scene.add_interaction(ps.FENEBonds([(0, 1)], 1.0, 100.0))
+    scene.add_interaction(ps.Angles([(0, 1, 2)], wave, depth=1.0))
+    scene.add_interaction(ps.HarmonicAngles([(0, 1, 2)], 1.0, 1.0))
+    scene.add_interaction(ps.Dihedrals([(0, 1, 2, 3)], torsion, multiplicity=3))
+    scene.add_interaction(ps.UniformGravity())
+    scene.add_interaction(ps.Drag(1.0))
+    scene.add_interaction(ps.ConstantForce((0, 1, 0)))
+    scene.add_interaction(ps.ParticleForce(swing, potential=swing_energy, axis=(0, 0, 1)))
+    scene.add_thermostat(ps.Langevin(temperature=1.0, friction=1.0))
+    scene.add_thermostat(ps.VelocityRescaling(temperature=1.0, relaxation_time=1.0))
+    return scene
+
+
+def few_forces(periodic, count, pressed=False):
+    scene = particles(count, periodic)
+    scene.add_interaction(ps.PairPotential(screened, cutoff=2.4, screening=1.0, power=2))
+    scene.add_interaction(ps.Springs([(0, 1)], 1.0, 1.0))
+    if pressed:
+        given = {"compressibility": 1.0, "relaxation_time": 1.0, "temperature": 1.0}
+        scene.add_barostat(ps.CellRescaling(pressure=1.0, **given))
+    return scene
+
+
+def charged():
+    """Kinds, pairs that are left out, Ewald sums, by a mesh and softened, and fields."""
+    scene = particles(periodic=BOX)
+    more = scene.add_particles([(1, 1, 1)], group="more")
+    kinds = [scene.groups[0], more]
+    pairs = ps.LennardJones(kinds, sigma=[1.0, 0.8], truncation="xplor", exclude=[(0, 1)])
+    scene.add_interaction(pairs)
+    scene.add_interaction(ps.Electrostatics("particle_mesh_ewald", tolerance=1e-2))
+    scene.add_interaction(ps.Gravity(softening=0.1, method="ewald", tolerance=1e-2))
+    scene.add_interaction(ps.FieldForce(ps.GridField(*BOX, 1.0, speed=1.0)))
+    scene.add_interaction(ps.FieldForce(ps.PoissonField(*BOX, 1.0), coupling="charge"))
+    return scene
+
+
+def damped():
+    scene = particles()
+    scene.add_interaction(ps.Springs([(0, 1)], 1.0, 1.0, damping=1.0))
+    scene.add_interaction(ps.Drag(1.0))
+    scene.add_interaction(ps.ElasticSolid(None, 1.0, 0.3, smoothing_length=2.0, dissipation=1.0))
+    return scene
+
+
+def fluid(periodic, walls=(), **options):
+    scene = particles(periodic=periodic, internal_energy=1.0)
+    scene.add_interaction(
+        ps.SPH(**{"smoothing_length": 1.0, "rest_density": 1.0, "equation_of_state": ps.Tait(10.0),
+                  **options})
+    )  # fmt: skip
+    for wall in walls:
+        scene.add_constraint(wall)
+    return scene
+
+
+def heated(**options):
+    thick = ps.ArtificialViscosity(1.0)
+    return fluid(None, equation_of_state=ps.IdealGas(1.4), viscosity=thick, **options)
+
+
+def constrained(periodic, *, breaks, bounces):
+    scene = particles(periodic=periodic)
+    limit = {"break_force": 1.0} if breaks else {}
+    triangle = ps.Constraint(flat, [(3, 4, 5)], area=1.0, inequality=True, **limit)
+    scene.add_constraint(ps.Distance([(0, 1), (1, 2)], 1.0, compliance=1e-6, damping=0.1, **limit))
+    scene.add_constraint(triangle)
+    if not breaks:
+        scene.add_interaction(ps.Constraint(flat, [(6, 7, 8)], area=1.0, compliance=1e-3)
+                              .as_force())  # fmt: skip
+    touch = {"friction": 0.1, "restitution": 0.5} if bounces else {}
+    scene.add_constraint(ps.Contact(**touch))
+    if periodic is None:
+        scene.add_interaction(ps.DFSPH(smoothing_length=1.0, rest_density=1.0))
+        scene.add_constraint(ps.PlaneBoundary((0, -9, 0), (0, 1, 0), **touch))
+        scene.add_constraint(ps.BoxBoundary((-9, -9, -9), (20, 20, 20), **touch))
+        scene.add_constraint(ps.SphereBoundary((0, 0, 0), 30.0, velocity=(1, 0, 0), **touch))
+    return scene
+
+
+def attracted(s, **attributes):
+    scene = particles(**attributes)
+    scene.add_interaction(ps.Gravity(softening=s))
+    return scene
+
+
+BELT = ps.PlaneBoundary((0, -9, 0), (0, 1, 0), velocity=(1, 0, 0), slip=False)
+BOX, XSPH, VERLET = ((0, 0, 0), (10, 10, 10)), ps.XSPH(), {"integrator": "velocity_verlet"}
+SCENES = {
+    "gas": (lambda: particles(), {}),
+    "uncompensated_gas": (lambda: particles(), {"compensated": False}),
+    "forces": (forces, {"ledger": True}),
+    "charged": (charged, {}),
+    "damped": (damped, VERLET),
+    "periodic_forces": (lambda: few_forces(BOX, 600, True), VERLET | {"compensated": False}),
+    "small_periodic_world": (lambda: few_forces(BOX, 20), {}),
+    "fluid": (
+        lambda: fluid(
+            None, [BELT], smoothing=Bell(),
+            viscosity=[ps.ArtificialViscosity(0.1, balsara=True), ps.LaminarViscosity(0.1), XSPH],
+        ),
+        {"most_substeps": 64},
+    ),
+    "periodic_fluid": (
+        lambda: fluid(BOX, smoothing="cubic_spline", equation_of_state=ps.Polytrope(1.0, 1.5),
+                      viscosity=[ps.ArtificialViscosity(0.1), ps.ParticleShifting(1.0)]), {}
+    ),
+    "heated_fluid": (heated, {}),
+    "gas_dynamics": (lambda: heated(smoothing_length=ps.AdaptiveSmoothing()), VERLET),
+    "constraints": (lambda: constrained(None, breaks=False, bounces=True), {"ledger": True}),
+    "breaking": (lambda: constrained(BOX, breaks=True, bounces=False), {"compensated": False}),
+    "tree": (lambda: attracted(0.1), {"opening_angle": 0.5}),
+    "own_softening": (lambda: attracted(None, softening=0.1), {"opening_angle": 0.5}),
+    **{name: (lambda name=name: load_scene(name).build(), {}) for name in ready_scenes()},
+}  # fmt: skip
+
+EVERY_KERNEL = (
+    "forces", "charged", "damped", "periodic_forces", "fluid", "constraints", "breaking",
+    "gas_dynamics", "star_collision", "tree",
+)  # fmt: skip
