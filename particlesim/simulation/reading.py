@@ -133,7 +133,7 @@ class Reading(Access):
             Of a constraint on tuples the estimate on the end that feels most, |lam| |grad C| /
             dt^2, (m,), in the order of its tuples; world by world where it stands for several. Of a
             boundary what particles exert on it, (3,), or (worlds, 3) where it stands for several:
-            those that touch it, and the pressure of fluids, without what one that sticks drags.
+            those that touch it, and fluids by pressure and, where they stick, by shear.
 
         Raises:
             ValueError: It is no part of this simulation, or neither of these.
@@ -142,6 +142,7 @@ class Reading(Access):
         found = bound.read_force(constraint)
         if not bound.solid:
             return found
+        self.loop.know_forces()
         chosen = [constraint is bound or constraint is peer for peer in bound.peers]
         pressing = [each.presses(bound) for each in self.interactions]
         for each in pressing:

@@ -69,6 +69,20 @@ def test_flow_between_plates(dragged):
 
 
 @slow
+@pytest.mark.parametrize("dragged", [False, True])
+def test_plates_feel_the_shear(dragged):
+    """eta du/dy times their length: of the driven flow 4 on either, of the dragged 1 against it."""
+    sim = simulate(poiseuille, 70, across=20, dragged=dragged)
+    sim.run(poiseuille.frames)  # what has not come to rest yet is exp(-pi^2) = 5e-5
+    length = 8 / 20
+    for plate, answer in zip(
+        sim.scenes[0].constraints, (1, -1) if dragged else (4, 4), strict=True
+    ):
+        # As the speed: 0.5 % at 20 across.
+        assert sim.force(plate)[0] == pytest.approx(answer * length, rel=0.01)
+
+
+@slow
 def test_flow_between_plates_converges():
     sizes = [10, 20, 40]
     errors = [channel_error(across, False) for across in sizes]

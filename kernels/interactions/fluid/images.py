@@ -99,13 +99,6 @@ def force_term(
     return term_of("push_images", lines, sums, width, seen, names, precision, data, params)
 
 
-def press_term(pull: wp.Function, seen: Seen, precision: Precision, data: Any, params: Any) -> Term:
-    """Term of (d_ia + d_ja) w by place: what the images of a pair have along a wall's normal."""
-    lines = [*pair_lines(seen), *pull_lines(seen, "j", "(D_i[{a}] + D_j[{a}])", [])]
-    sums, names = ", ".join(f"b{a}" for a in range(seen.total)), {"pull": pull}
-    return term_of("press", lines, sums, seen.total, seen, names, precision, data, params)
-
-
 @functools.cache
 def own_push(
     pull: wp.Function, dragged: wp.Function | None, seen: Seen, precision: Precision, data: Any,
@@ -196,25 +189,6 @@ def function_of(
         "one": precision.vector(1), "nearest": nearest_function(precision, seen.total),
     }  # fmt: skip
     return function_from_source(source, {**known, **names})
-
-
-@functools.cache
-def keep_press(
-    own: wp.Function, first: int, last: int, total: int, precision: Precision, data: Any,
-    params: Any, out: Any,
-) -> wp.Function:  # fmt: skip
-    """Store: the force on each particle by the walls in places ``first`` to ``last``."""
-    vec3, each = precision.vec3, precision.vector(total)
-
-    def keep_wall_force(i: int, particle: int, found: each, d: data, p: params, o: out):
-        b = own(i, d, p)
-        N = o.normal[i]
-        f = vec3()
-        for k in range(wp.static(first), wp.static(last)):
-            f = f + vec3(N[k, 0], N[k, 1], N[k, 2]) * (found[k] + b[3 + k])
-        o.pressed[i] = f * d.m[i]
-
-    return function(keep_wall_force)
 
 
 @functools.cache

@@ -13,7 +13,7 @@ from ...engine.easing import Easing
 from ...engine.execution.launch import call, launch, when
 from ...engine.model import Model, filled, structure_of
 from ...engine.state import State
-from ...kernels.interactions.fluid import images
+from ...kernels.interactions.fluid import images, presses
 from ...kernels.interactions.fluid import walls as kernels
 from ...kernels.interactions.fluid.sph import DIRECTIONS, keep_state
 from ...scene.constraint_base import ConstraintBase
@@ -197,16 +197,17 @@ class Walls:
     def pressed(self, part: Part) -> np.ndarray | None:
         """What the fluid exerts on a boundary, (worlds, 3), at the last densities; None: nothing.
 
-        To each of several walls the part along its normal.
+        To each of several walls the part along its normal, and what drags along them to the first
+        to which it sticks.
         """
         for (wall, _), places in zip(self.held, self.places, strict=True):
             if wall.peers != part.peers:
                 continue
-            pairs, own = self.fluid.pairs, self.own_pushes[-1]
-            term = images.press_term(self.pulls, self.seen, *self.types)
-            store = functools.partial(
-                images.keep_press, own, min(places), max(places) + 1, self.total
-            )
+            pairs, dragged = self.fluid.pairs, self.fluid.dragged(*self.types)
+            given = self.pulls, dragged, self.seen, places
+            term = presses.press_term(*given, *self.types)
+            own = presses.own_press(*given, *self.types)
+            store = functools.partial(presses.keep_press, own, places, self.total)
             pressed = pairs.array(self.model.precision.vec3)
             self.loop.sum(term, store, {"pressed": pressed, "normal": self.normal})
             force = pressed.numpy().astype(np.float64)

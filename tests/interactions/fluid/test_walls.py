@@ -100,10 +100,21 @@ def test_images_are_what_particles_behind_the_walls_would_be(slip):
         assert np.abs(found - expected).max() < 1e-12 * np.abs(expected).max()
     assert np.isclose(sim.diagnostics().potential[0], whole.diagnostics().potential[0] / 8)
     # What the walls are pressed by is what keeps the momentum of one octant from being kept.
-    # Of a fluid that sticks what it drags along is left out.
-    if slip:
-        pressed = sim.force(scene.constraints[0])
-        assert np.allclose(pressed, -sim.get("force").sum(axis=0), rtol=1e-9)
+    assert np.allclose(sim.force(walls), -sim.get("force").sum(axis=0), rtol=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sticks", [(True, True), (True, False), (False, True)])
+def test_walls_bear_together_what_the_fluid_loses(sticks):
+    """Also where it sticks to one and slips along the other, and of two kinds of viscosity."""
+    walls = [
+        ps.PlaneBoundary((0, 0, 0), (1, 0, 0), slip=not sticks[0]),
+        ps.BoxBoundary((-9, 0, 0), (9, 9, 9), slip=not sticks[1]),
+    ]
+    viscosity = [ps.ArtificialViscosity(0.5, 1), ps.LaminarViscosity(0.1)]
+    sim = simulation(water(walls, viscosity=viscosity, speed=1.0))
+    total = sum(sim.force(each) for each in walls)
+    assert np.allclose(total, -sim.get("force").sum(axis=0), rtol=1e-9)
 
 
 @pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
