@@ -43,7 +43,7 @@ def build(
     corners = np.isin(i, (0, edge - 1)) & np.isin(j, (0, edge - 1))
     cloth = scene.add_particles(
         side * x, mass=weight * (side / edge) ** 2, radius=0.34 * spacing,
-        pinned=corners.ravel(), group="cloth", color=(0.7, 0.3, 0.2),
+        pinned=corners.ravel(), group="cloth", color=(0.7, 0.3, 0.2), triangles=triangles(edge),
     )  # fmt: skip
     ball = ps.sample.sphere((0, 0, 0), radius, spacing)
     fall = height + 2.3 * radius * drops
@@ -52,8 +52,9 @@ def build(
         aside, up = 0.1 * side * rng.uniform(-1, 1), height + radius * (1 + 2.3 * k)
         rain.append(ball + np.array([aside, up, 0.0]))
     water = scene.add_particles(
-        np.concatenate(rain), mass=WATER * spacing**3, radius=0.4 * spacing, group="water"
-    )
+        np.concatenate(rain), mass=WATER * spacing**3, radius=0.4 * spacing, group="water",
+        color=(0.3, 0.5, 0.8),
+    )  # fmt: skip
     scene.add_interaction(ps.UniformGravity((0, -GRAVITY, 0)))
     scene.add_interaction(
         ps.SPH(
@@ -79,6 +80,13 @@ def threads(edge: int) -> np.ndarray:
         (k[1:, :-1], k[:-1, 1:]),
     )
     return np.concatenate([np.stack([a.ravel(), b.ravel()], axis=1) for a, b in ends])
+
+
+def triangles(edge: int) -> np.ndarray:
+    """Two for each cell of such a square."""
+    k = np.arange(edge * edge).reshape(edge, edge)
+    a, b, c, d = (each.ravel() for each in (k[:-1, :-1], k[1:, :-1], k[:-1, 1:], k[1:, 1:]))
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([c, b, d], axis=1)])
 
 
 def error(sim: ps.Simulation) -> float:
