@@ -18,7 +18,7 @@ def over(sim, fluid):
 @pytest.mark.slow
 @pytest.mark.parametrize("across", [10, 20])
 def test_tank_at_rest_in_a_box(across):
-    """Ten seconds: it stands as high as it was, weighs as much, and comes to rest.
+    """Ten seconds: it stands as high as it was, weighs as much, and is all but at rest.
 
     Its step is six to three times that of a weakly compressible fluid of the same speeds.
     """
@@ -34,16 +34,16 @@ def test_tank_at_rest_in_a_box(across):
     tank = scene.add_constraint(ps.BoxBoundary((0, 0, 0), (0.5, 2, 0.5)))
     settings = ps.Settings(dt=1 / 150, substeps=across // 10)
     sim = ps.Simulation(scene, settings, device="cpu")
-    sim.run(225)
-    early = sim.diagnostics().kinetic[0]
-    sim.run(1125)
+    sim.run(1350)
     force = []
     for _ in range(150):
         sim.step()
         force.append(sim.force(tank))
         assert sim.diagnostics().density_error[0] <= settings.density_tolerance
     assert abs(2 * sim.position[:, 1].mean() - 1) < 0.01
-    assert sim.diagnostics().kinetic[0] < 0.5 * early
+    # Up to what the tolerances leave: 1e-4 H in a step is 0.015 to 0.03 length/s, of which speeds
+    # of 0.01 sqrt(g H) = 0.03 are the round number.
+    assert sim.diagnostics().kinetic[0] < 0.5 * 250 * G * 0.01**2
     assert np.mean(force, axis=0) == pytest.approx([0, -250 * G, 0], abs=0.02 * 250 * G)
 
 
