@@ -51,7 +51,7 @@ def density_term(
     lines = [*seen.read("D=wall"), "found = weight(wp.sqrt(r2) * p.inverse_h)", *_weights(seen)]
     names = {"weight": weight, "mass": reader(precision)}
     sums = "mass(d.m, j) * found"
-    return _term("add_images", lines, sums, 1, seen, names, precision, data, params)
+    return term("add_images", lines, sums, 1, seen, names, precision, data, params)
 
 
 @functools.cache
@@ -62,7 +62,7 @@ def own_weight(
     lines = ["j = i", *seen.read("D=wall"), "r2 = real(0.0)", "found = weight(r2)"]
     lines += _weights(seen)
     header, names = "own(i: int, d: Data, p: Params)", {"weight": weight}
-    return _function(header, lines, "found", seen, names, precision, data, params)
+    return image_function(header, lines, "found", seen, names, precision, data, params)
 
 
 def force_term(
@@ -96,14 +96,14 @@ def force_term(
     sums = ", ".join([*(f"f[{c}]" for c in range(3)), *(f"b{a}" for a in range(seen.places))])
     names = {"pull": pull, "dragged": dragged, "direction": precision.vec3(*direction)}
     width = 3 + seen.places
-    return _term("push_images", lines, sums, width, seen, names, precision, data, params)
+    return term("push_images", lines, sums, width, seen, names, precision, data, params)
 
 
 def press_term(pull: wp.Function, seen: Seen, precision: Precision, data: Any, params: Any) -> Term:
     """Term of (d_ia + d_ja) w by place: what the images of a pair have along a wall's normal."""
     lines = [*_pair(seen), *_pulls(seen, "j", "(D_i[{a}] + D_j[{a}])", [])]
     sums, names = ", ".join(f"b{a}" for a in range(seen.total)), {"pull": pull}
-    return _term("press", lines, sums, seen.total, seen, names, precision, data, params)
+    return term("press", lines, sums, seen.total, seen, names, precision, data, params)
 
 
 @functools.cache
@@ -120,7 +120,7 @@ def own_push(
     result = f"sums({', '.join(numbers)})"
     names = {"pull": pull, "dragged": dragged, "sums": precision.vector(3 + seen.places)}
     header = "own(i: int, d: Data, p: Params)"
-    return _function(header, lines, result, seen, names, precision, data, params)
+    return image_function(header, lines, result, seen, names, precision, data, params)
 
 
 def _pair(seen: Seen) -> list[str]:
@@ -175,17 +175,17 @@ def _pulls(seen: Seen, j: str, arm: str, also: list[str]) -> list[str]:
     return lines
 
 
-def _term(
+def term(
     name: str, lines: list[str], sums: str, width: int, seen: Seen, names: dict[str, Any],
     precision: Precision, data: Any, params: Any,
 ) -> Term:  # fmt: skip
     header = f"{name}(i: int, j: int, x_ij: vec3, r2: real, d: Data, p: Params)"
     names = {**names, "sums": precision.vector(width)}
-    made = _function(header, lines, f"sums({sums})", seen, names, precision, data, params)
+    made = image_function(header, lines, f"sums({sums})", seen, names, precision, data, params)
     return Term(made, width, rounding="fused")
 
 
-def _function(
+def image_function(
     header: str, lines: list[str], result: str, seen: Seen, names: dict[str, Any],
     precision: Precision, data: Any, params: Any,
 ) -> wp.Function:  # fmt: skip

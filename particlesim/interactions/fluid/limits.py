@@ -16,6 +16,7 @@ from .viscosities import ArtificialViscosity, ParticleShifting
 ACCELERATION = 0.25
 ADVISED = 0.4  # of h / c, for accuracy (Monaghan 1992)
 POINTS = 400  # of quadratures over the support
+SURFACE = {1: 2.0, 2: 2.0 * np.pi, 3: 4.0 * np.pi}  # of the unit sphere
 WAVENUMBERS = np.linspace(0.02, 8.0, 400)  # kappa = k h; k W_hat is largest near 1.8
 
 
@@ -37,7 +38,7 @@ def fluid_limits(part: Any, probe: Probe) -> list[Limit]:
     c = _heard(part, probe, part.sound_speeds(probe))
     h = each["smoothing_length"] = part.smoothing_lengths(rows)
     omega = c * steepest(part.smoothing, part.dimension) / h
-    gamma = _damping_rates(part, probe, each, c)
+    gamma = _damping_rates(part, probe, each, c) + _spreading_rates(part, each, c)
     k = int(np.argmax(gamma + np.sqrt(gamma**2 + 4.0 * omega**2)))  # by either integrator
     reason = f"h = {h[k]:.4g}, c = {c[k]:.4g}, omega = {omega[k]:.4g} /s, gamma = {gamma[k]:.4g} /s"
     dt = probe.loop.integrator.largest_step(float(omega[k]) ** 2, float(gamma[k]))
@@ -89,11 +90,25 @@ def _damping_rates(
     if not forces:
         return np.zeros_like(c)
     if not (len(forces) == 1 and isinstance(forces[0], ArtificialViscosity)):
-        return np.full_like(c, probe.damping(part))
+        with part.still():
+            return np.full_like(c, probe.damping(part))
     speed = probe.relative_speed(part.pairs.members_host)
     meeting = speed.max() + np.sqrt((speed**2).mean())
     strength = each["viscosity_alpha"] * c + 2.0 * each["viscosity_beta"] * meeting
     return damping(part.smoothing, part.dimension) * strength / each["smoothing_length"]
+
+
+def _spreading_rates(part: Any, each: dict[str, np.ndarray], c: np.ndarray) -> np.ndarray:
+    """Of what evens out densities, D(rho) = -lambda rho of a wave: lambda <= 4 delta c / h I.
+
+    I = int |W'| / r d^dx h^2; twice the difference of a pair, of 2 delta h c V |W'| / r.
+    """
+    if part.density is None:
+        return np.zeros_like(c)
+    q, w = _samples(part.smoothing)
+    slope = np.abs(np.gradient(w, q)) * q ** (part.dimension - 2)
+    rate = 4.0 * SURFACE[part.dimension] * slope.sum() * part.smoothing.support / POINTS
+    return rate * each["density_diffusion"] * c / each["smoothing_length"]
 
 
 def steepest(smoothing: Smoothing, dimension: int) -> float:
@@ -125,7 +140,7 @@ def damping(smoothing: Smoothing, dimension: int) -> float:
     of the matrix: D = 2/d int |W'| r / (r^2 + 0.01 h^2) d^dx h^2.
     """
     q, w = _samples(smoothing)
-    surface = {1: 2.0, 2: 2.0 * np.pi, 3: 4.0 * np.pi}[dimension]
+    surface = SURFACE[dimension]
     rate = np.abs(np.gradient(w, q)) * q**dimension / (q**2 + 0.01)
     return float(2.0 / dimension * surface * rate.sum() * smoothing.support / POINTS)
 

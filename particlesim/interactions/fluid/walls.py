@@ -15,7 +15,7 @@ from ...engine.model import Model, filled, structure_of
 from ...engine.state import State
 from ...kernels.interactions.fluid import images
 from ...kernels.interactions.fluid import walls as kernels
-from ...kernels.interactions.fluid.sph import DIRECTIONS, keep_state
+from ...kernels.interactions.fluid.sph import DIRECTIONS
 from ...scene.constraint_base import ConstraintBase
 from ...scene.part import Part
 from ..pair_loop import PairLoop
@@ -87,7 +87,8 @@ class Walls:
         self.struct = kernels.near_type(precision, self.total)()
         self.struct.distance = self.distance
         self.struct.rate = none if self.rate is None else self.rate
-        sticks = [wall.sticky and moving for wall in self.walls]
+        viscous = bool(self.fluid.viscosity)
+        sticks = [wall.sticky and viscous for wall in self.walls]
         carried = any(on and len(wall.pose) for on, wall in zip(sticks, self.walls, strict=True))
         vec3, count = precision.vec3, pairs.count if carried else 0
         self.against = pairs.array(vec3) if count else wp.empty(0, dtype=vec3, device=model.device)
@@ -135,8 +136,7 @@ class Walls:
         self.seen = images.Seen(self.total, self.sticky, against=against)
         one = None if self.sticky is None else self.sticky[:1]
         self.ways = [images.Seen(self.total, one, True, against), self.seen]
-        self.density_terms = [images.density_term(fluid.weight, each, *types) for each in self.ways]
-        self.own_weights = [images.own_weight(fluid.weight, each, *types) for each in self.ways]
+        self.sums = [fluid.beside_walls(each, *types) for each in self.ways]
         self.force_terms = [images.force_term(*pair, each, direction, *types) for each in self.ways]
         self.own_pushes = [images.own_push(*pair, each, *types) for each in self.ways]
 
@@ -170,15 +170,18 @@ class Walls:
         near = kernels.near_kernel(precision, self.total, alike, fluid.Params)
         launch(near, pairs.rows, [pairs.pairs, fluid.params, self.struct], device)
 
-    def sum_density(self, plain: Pass, laws: tuple[Any, ...]) -> None:
-        """The pass of densities, of which ``plain`` is that far from walls."""
+    def sum_density(self, plain: Pass, keep: Any) -> None:
+        """The pass of densities, of which ``plain`` is that far from walls.
+
+        ``keep`` makes the store of a particle's own term.
+        """
         if not self:
             plain.loop.sum(*plain[1:])
             return
         self.look()
         beside = [
-            Pass(self.loop, term, functools.partial(keep_state, own, *laws), plain.out)
-            for term, own in zip(self.density_terms, self.own_weights, strict=True)
+            Pass(self.loop, term, functools.partial(keep, own), plain.out)
+            for term, own in self.sums
         ]
         self._sum(plain, *beside)
 
