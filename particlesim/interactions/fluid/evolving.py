@@ -13,7 +13,7 @@ from ... import validate
 from ...engine.model import Model
 from ...engine.state import State
 from ...scene.part import Interaction, Part
-from .continuity import Continuity, ContinuityDensity
+from .density.continuity import Continuity, ContinuityDensity
 from .equations_of_state import EquationOfState
 from .heat import ENERGY, Heat
 from .interfaces.fluids import Fluids
@@ -135,10 +135,11 @@ class Evolving(Interaction):
         kept = {} if self.heat is None else self.heat.persistent()
         if self.continuity is not None:
             kept |= self.continuity.persistent()
-        return {**kept, **self.walls.easing.persistent()} if self.walls else kept
+        return {**kept, **self.walls.persistent()} if self.walls else kept
 
     def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
-        return self.walls.worlds if name == "slack" else super().worlds(name, array)
+        of_sides = name in ("slack", "closing")
+        return self.walls.worlds if of_sides else super().worlds(name, array)
 
     def reset(self, worlds: Sequence[int]) -> None:
         self.forget(self.persistent(), worlds)

@@ -20,7 +20,7 @@ from ...kernels.interactions.fluid import lengths as of_lengths
 from ...kernels.interactions.fluid import sph as kernels
 from ...kernels.interactions.fluid.laws import bound_law
 from ..pair_loop import PairLoop
-from .continuity import Continuity
+from .density.continuity import Continuity
 from .evolving import Evolving
 from .heat import ENERGY, Heat, check_energies
 from .lattice import lattice_sums, spacings

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ... import validate
-from .continuity import ContinuityDensity
+from .density.continuity import ContinuityDensity
 from .equations_of_state import EquationOfState
 from .heat import ENERGY
 from .interfaces.fluids import FLUID, Fluids

@@ -102,6 +102,9 @@ class Walls:
         sides = [len(wall.places) for wall in self.walls]
         self.stride, self.begins = sum(sides), np.cumsum([0, *sides])[:-1].tolist()
         self.easing = Easing(model, model.world_count * self.stride, wp.float32, ends=1)
+        # By continuity the density answers to a wall that comes back.
+        count = 0 if self.fluid.continuity is None else len(self.easing.slack)
+        self.closing = wp.zeros(count, dtype=wp.float32, device=model.device)
         self.rest = model.array(0.5 * self.fluid.spacings, precision.scalar)
         self._make_terms(fields)
 
@@ -110,14 +113,19 @@ class Walls:
         if dt <= 0:
             return
         easing = self.easing
-        inputs = [self.rest, easing.struct, dt, self.stride, easing.slack]
+        inputs = [self.rest, easing.struct, dt, self.stride, easing.slack, self.closing]
         kernel = kernels.ease_kernel(self.model.precision)
         launch(kernel, len(easing.slack), inputs, self.model.device)
         call(easing.unmark)
 
+    def persistent(self) -> dict[str, wp.array]:
+        """What outlives a substep."""
+        closing = {"closing": self.closing} if len(self.closing) else {}
+        return {**self.easing.persistent(), **closing}
+
     @property
     def worlds(self) -> np.ndarray:
-        """The world of each row of the slack."""
+        """The world of each row of the slack, and of how fast it closes."""
         return np.repeat(np.arange(self.model.world_count), self.stride)
 
     def _make_terms(self, fields: Mapping[str, wp.array]) -> None:
@@ -164,7 +172,7 @@ class Walls:
         nowhere = kernels.nowhere_kernel(precision, self.total, fluid.Params)
         launch(nowhere, pairs.count, [pairs.pairs, fluid.params, v, self.struct], device)
         for begin, (surface, inputs) in zip(self.begins, seen, strict=True):
-            own = [*inputs, v, begin, self.stride, slack, self.struct]
+            own = [*inputs, v, begin, self.stride, slack, self.closing, self.struct]
             launch(kernels.distance_kernel(surface), pairs.count, own, device)
         alike = self.sticky is None or len(set(self.sticky)) == 1
         near = kernels.near_kernel(precision, self.total, alike, fluid.Params)

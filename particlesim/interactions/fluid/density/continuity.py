@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ... import validate
-from ...engine.execution.launch import call, launch
-from ...engine.model import Model
-from ...engine.state import State
-from ...kernels.interactions.fluid import continuity as kernels
-from ...kernels.interactions.fluid import sph as of_sums
-from ...kernels.interactions.fluid.seen import Seen
-from ..pair_loop import PairLoop
+from .... import validate
+from ....engine.execution.launch import call, launch
+from ....engine.model import Model
+from ....engine.state import State
+from ....kernels.interactions.fluid import continuity as kernels
+from ....kernels.interactions.fluid import sph as of_sums
+from ....kernels.interactions.fluid.seen import Seen
+from ...pair_loop import PairLoop
 
 START = "start_density"  # the attribute [mass/length^d]
 
