@@ -140,10 +140,8 @@ def damped():
 
 def fluid(periodic, walls=(), **options):
     scene = particles(periodic=periodic, internal_energy=1.0)
-    scene.add_interaction(
-        ps.SPH(**{"smoothing_length": 1.0, "rest_density": 1.0, "equation_of_state": ps.Tait(10.0),
-                  **options})
-    )  # fmt: skip
+    given = {"smoothing_length": 1.0, "rest_density": 1.0, "equation_of_state": ps.Tait(10.0)}
+    scene.add_interaction(ps.SPH(**(given | options)))
     for wall in walls:
         scene.add_constraint(wall)
     return scene
@@ -199,6 +197,8 @@ SCENES = {
         lambda: fluid(BOX, smoothing="cubic_spline", equation_of_state=ps.Polytrope(1.0, 1.5),
                       viscosity=[ps.ArtificialViscosity(0.1), ps.ParticleShifting(1.0)]), {}
     ),
+    "continuity": (lambda: fluid(None, density=ps.ContinuityDensity()), VERLET),
+    "continuity_beside_walls": (lambda: fluid(None, [BELT], density=ps.ContinuityDensity()), {}),
     "heated_fluid": (heated, {}),
     "gas_dynamics": (lambda: heated(smoothing_length=ps.AdaptiveSmoothing()), VERLET),
     "constraints": (lambda: constrained(None, breaks=False, bounces=True), {"ledger": True}),
@@ -210,7 +210,7 @@ SCENES = {
 
 EVERY_KERNEL = (
     "forces", "charged", "damped", "periodic_forces", "fluid", "constraints", "breaking",
-    "gas_dynamics", "star_collision", "tree",
+    "gas_dynamics", "star_collision", "tree", "continuity",
 )  # fmt: skip
 
 

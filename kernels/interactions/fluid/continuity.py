@@ -91,22 +91,43 @@ def gradient_term(slope: wp.Function, precision: Precision, data: Any, params: A
 
 
 @functools.cache
+def solve_function(precision: Precision) -> wp.Function:
+    """``solve(s)``: M^-1 b of these nine numbers, M symmetric, by its factors L D L^T.
+
+    An inverse by minors would lose to rounding what few neighbours leave of it.
+    """
+    real, vec3, nine = precision.scalar, precision.vec3, precision.vector(9)
+
+    def solve(s: nine):
+        least = real(REGULAR)
+        d_0 = s[0] + least
+        l_10 = s[5] / d_0
+        l_20 = s[4] / d_0
+        d_1 = wp.max(s[1] + least - l_10 * s[5], least)
+        a = s[3] - l_10 * s[4]
+        l_21 = a / d_1
+        d_2 = wp.max(s[2] + least - l_20 * s[4] - l_21 * a, least)
+        y_1 = s[7] - l_10 * s[6]
+        g_2 = (s[8] - l_20 * s[6] - l_21 * y_1) / d_2
+        g_1 = y_1 / d_1 - l_21 * g_2
+        return vec3(s[6] / d_0 - l_10 * g_1 - l_20 * g_2, g_1, g_2)
+
+    return function(solve)
+
+
+@functools.cache
 def keep_gradient(
     pressure: wp.Function, sound_speed: wp.Function, precision: Precision, data: Any, params: Any,
     out: Any,
 ) -> wp.Function:  # fmt: skip
     """Store: (h g, c) of every slot."""
-    real, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    vec4, nine = precision.vector(4), precision.vector(9)
+    real, vec4, nine = precision.scalar, precision.vector(4), precision.vector(9)
+    solve = solve_function(precision)
 
     def keep(i: int, particle: int, s: nine, d: data, p: params, o: out):
         rho = p.rest_density + d.excess[i]
         c = sound_speed(rho, real(0.0), pressure(rho, real(0.0), p), p)
-        more = real(REGULAR)
-        M = mat33(
-            s[0] + more, s[5], s[4], s[5], s[1] + more, s[3], s[4], s[3], s[2] + more
-        )  # fmt: skip
-        g = wp.inverse(M) * vec3(s[6], s[7], s[8])
+        g = solve(s)
         o.gradient[i] = vec4(g[0], g[1], g[2], c)
 
     return function(keep)
@@ -135,7 +156,7 @@ def gain_function(
 def rate_term(
     slope: wp.Function, diffuses: bool, precision: Precision, data: Any, params: Any
 ) -> Term:  # fmt: skip
-    """Term of the rate of the density, without what the slope of W is normalised by."""
+    """Term of the rate of the density times h^2."""
     vec3, real, one = precision.vec3, precision.scalar, precision.vector(1)
     gained = gained_function(slope, diffuses, precision, data, params)
 
@@ -157,7 +178,7 @@ def gained_function(
     def gained(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
         v_ij = vector_of(d.move, i) - vector_of(d.move, j)
         found = gain(i, wp.dot(v_ij, x_ij), wp.dot(v_ij, v_ij), r2, d, p)
-        m = read(d.m, j)
+        m = read(d.m, j) * p.sigma
         rate = m * found[1]
         if wp.static(diffuses):
             excess_j = read(d.excess, j)
@@ -201,7 +222,7 @@ def walled_rate_term(
         "gain": gain_function(slope, precision, data, params), "mass": reader(precision),
         "gained": gained_function(slope, diffuses, precision, data, params),
     }  # fmt: skip
-    sums = "gained(i, j, x_ij, r2, d, p) + mass(d.m, j) * found"
+    sums = "gained(i, j, x_ij, r2, d, p) + mass(d.m, j) * p.sigma * found"
     return images.term("add_rates", lines, sums, 1, seen, names, precision, data, params)
 
 
@@ -209,7 +230,7 @@ def walled_rate_term(
 def own_rate(
     slope: wp.Function, seen: Seen, precision: Precision, data: Any, params: Any
 ) -> wp.Function:
-    """``own(i, d, p)``: that of the images that a particle has of itself, for a mass of 1."""
+    """``own(i, d, p)``: that of the images that a particle has of itself, for m sigma = 1."""
     lines = ["j = i", *seen.read("D=wall", "R=rate"), "r2 = real(0.0)", "approach = real(0.0)"]
     lines += ["speed2 = real(0.0)", "found = real(0.0)", *_images(seen)]
     header = "own(i: int, d: Data, p: Params)"
@@ -239,7 +260,7 @@ def keep_density(
 
     def keep(i: int, particle: int, total: one, d: data, p: params, o: out):
         m = d.m[i]
-        rate = (p.sigma * (total[0] + m * own(i, d, p)) * p.inverse_h) * p.inverse_h
+        rate = (total[0] + (m * p.sigma) * own(i, d, p)) * p.inverse_h * p.inverse_h
         excess = wp.max(d.excess[i] + d.lag[i] * rate, real(LEAST - 1.0) * p.rest_density)
         rho = p.rest_density + excess
         pressure_i = pressure(rho, real(0.0), p)
