@@ -148,8 +148,7 @@ def distance_kernel(surface: Surface) -> wp.Kernel:
             w = pairs.world[i]
             d, N = sight(x[i], parameters[w], pose, w)
             own = each(o.distance[i])
-            n_own = normals(o.normal[i])
-            rate = each()
+            n_own, rate = normals(o.normal[i]), each()
             rated = o.rate.shape[0] > 0
             if rated:
                 rate = each(o.rate[i])

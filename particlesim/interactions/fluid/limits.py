@@ -16,7 +16,6 @@ from .viscosities import ArtificialViscosity, ParticleShifting
 ACCELERATION = 0.25
 ADVISED = 0.4  # of h / c, for accuracy (Monaghan 1992)
 POINTS = 400  # of quadratures over the support
-SURFACE = {1: 2.0, 2: 2.0 * np.pi, 3: 4.0 * np.pi}  # of the unit sphere
 WAVENUMBERS = np.linspace(0.02, 8.0, 400)  # kappa = k h; k W_hat is largest near 1.8
 
 
@@ -99,16 +98,25 @@ def _damping_rates(
 
 
 def _spreading_rates(part: Any, each: dict[str, np.ndarray], c: np.ndarray) -> np.ndarray:
-    """Of what evens out densities, D(rho) = -lambda rho of a wave: lambda <= 4 delta c / h I.
+    """By how fast what evens out densities takes a wave away, which its gradients hardly see.
 
-    I = int |W'| / r d^dx h^2; twice the difference of a pair, of 2 delta h c V |W'| / r.
+    lambda = 2 delta c h int (1 - cos k.x) |W'| / r d^dx, at most, of each member.
     """
     if part.density is None:
         return np.zeros_like(c)
-    q, w = _samples(part.smoothing)
-    slope = np.abs(np.gradient(w, q)) * q ** (part.dimension - 2)
-    rate = 4.0 * SURFACE[part.dimension] * slope.sum() * part.smoothing.support / POINTS
-    return rate * each["density_diffusion"] * c / each["smoothing_length"]
+    spread = 2.0 * spreading(part.smoothing, part.dimension) * each["density_diffusion"]
+    return spread * c / each["smoothing_length"]
+
+
+@functools.cache
+def spreading(smoothing: Smoothing, dimension: int) -> float:
+    """max over k of int (1 - cos k.x) |W'| / r d^dx h^2."""
+    q, w = _samples(smoothing)
+    slope = np.abs(np.gradient(w, q)) / q
+    shell = slope * (
+        _shells(0.0 * q, q, dimension) - _shells(WAVENUMBERS[:, None] * q, q, dimension)
+    )
+    return float(shell.sum(axis=1).max() * smoothing.support / POINTS)
 
 
 def steepest(smoothing: Smoothing, dimension: int) -> float:
@@ -120,15 +128,18 @@ def steepest(smoothing: Smoothing, dimension: int) -> float:
 def transform(smoothing: Smoothing, dimension: int) -> np.ndarray:
     """W_hat(k) = int W cos(k.x) d^dx, 1 at k = 0, at ``WAVENUMBERS`` / h."""
     q, w = _samples(smoothing)
-    angles = WAVENUMBERS[:, None] * q
-    if dimension == 1:
-        shell = 2.0 * np.cos(angles)
-    elif dimension == 2:
-        turn = (np.arange(64) + 0.5) * np.pi / 64
-        shell = 2.0 * np.pi * q * np.cos(angles[..., None] * np.cos(turn)).mean(axis=-1)
-    else:
-        shell = 4.0 * np.pi * q**2 * np.sinc(angles / np.pi)
+    shell = _shells(WAVENUMBERS[:, None] * q, q, dimension)
     return (shell * w).sum(axis=1) * smoothing.support / POINTS
+
+
+def _shells(angles: np.ndarray, q: np.ndarray, dimension: int) -> np.ndarray:
+    """Of shells of radius q their surface times the mean of cos(k.x), for these k q."""
+    if dimension == 1:
+        return 2.0 * np.cos(angles)
+    if dimension == 2:
+        turn = (np.arange(64) + 0.5) * np.pi / 64
+        return 2.0 * np.pi * q * np.cos(angles[..., None] * np.cos(turn)).mean(axis=-1)
+    return 4.0 * np.pi * q**2 * np.sinc(angles / np.pi)
 
 
 @functools.cache
@@ -140,7 +151,7 @@ def damping(smoothing: Smoothing, dimension: int) -> float:
     of the matrix: D = 2/d int |W'| r / (r^2 + 0.01 h^2) d^dx h^2.
     """
     q, w = _samples(smoothing)
-    surface = SURFACE[dimension]
+    surface = {1: 2.0, 2: 2.0 * np.pi, 3: 4.0 * np.pi}[dimension]
     rate = np.abs(np.gradient(w, q)) * q**dimension / (q**2 + 0.01)
     return float(2.0 / dimension * surface * rate.sum() * smoothing.support / POINTS)
 
