@@ -86,7 +86,7 @@ class Passes(Evolving):
         # Mass, density, P / rho^2 and sound speed of each slot, together as they are read together.
         self.slot_state = self.pairs.array(precision.vector(4))
         fields = {"x": held["position"], "state": self.slot_state, **self.fluids.read(held["mass"])}
-        if "velocity" in held:
+        if self.viscosity or self.continuity is not None:
             fields["v"] = held["velocity"]
         if self.continuity is not None:
             fields |= self.continuity.attach(state)
