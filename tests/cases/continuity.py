@@ -8,7 +8,7 @@ H, SOUND = 0.7, 10.0
 
 
 def stirred(density, held=False, count=8):
-    """A square of fluid, periodic or held by a box, that is stirred."""
+    """A square of fluid that is stirred, periodic or held by two walls."""
     spacing = 1 / count
     x = ps.sample.box((0, 0, 0), (1, 1, 0), spacing)
     noise = np.random.default_rng(0).normal(0, 0.1, x.shape) * [1, 1, 0]
@@ -20,7 +20,8 @@ def stirred(density, held=False, count=8):
                equation_of_state=ps.Tait(SOUND, negative_pressure=True))
     )  # fmt: skip
     if held:
-        scene.add_constraint(ps.BoxBoundary((0, 0, -np.inf), (1, 1, np.inf)))
+        for normal in ((1, 0, 0), (0, 1, 0)):
+            scene.add_constraint(ps.PlaneBoundary((0, 0, 0), normal))
     return scene
 
 

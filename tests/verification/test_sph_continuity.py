@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from particlesim.scenes import dam_break, elliptical_drop, standing_wave
+from cases.waves import fitted
+from particlesim.scenes import dam_break, elliptical_drop
 
 G = 9.81
 
@@ -67,28 +68,6 @@ def test_tank_that_fits_no_lattice(width):
     assert slope == pytest.approx(1.0, abs=0.02) and noise < 0.005
 
 
-def wave(length, spacing, density):
-    """Period of a standing wave over the exact one, and its damping [1/s], by the best fit."""
-    exact = standing_wave.period(length)
-    dt = exact / 40
-    substeps = int(np.ceil(dt / (0.35 * 2 * spacing / standing_wave.SOUND)))
-    scene = standing_wave.build(length, spacing, density=density)
-    settings = standing_wave.settings.replace(dt=dt, substeps=substeps)
-    sim = ps.Simulation(scene, settings, device="cpu")
-    signal = [standing_wave.amplitude(sim)]
-    for _ in range(120):
-        sim.step()
-        signal.append(standing_wave.amplitude(sim))
-    t, best = dt * np.arange(121), (np.inf, 0.0, 0.0)
-    for ratio in np.linspace(0.9, 1.15, 251):
-        for damping in np.linspace(0.0, 2.0, 41):
-            phase, fall = 2 * np.pi * t / (ratio * exact), np.exp(-damping * t)
-            basis = np.stack([fall * np.cos(phase), fall * np.sin(phase)], axis=1)
-            left = signal - basis @ np.linalg.lstsq(basis, signal, rcond=None)[0]
-            best = min(best, ((left**2).sum(), ratio, damping))
-    return best[1:]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("delta", [0.0, 0.1])
 @pytest.mark.parametrize("length", [1.0, 2.0])
@@ -99,7 +78,7 @@ def test_standing_wave(length, delta, across):
     Found, 48 to a wave: 0.5 and 0.1 % off, where sums are 6 and 3 % off; 96: 0.0 and 0.3 %, and
     1 %. Falls of 0.1 /s at most are those of the viscosity, where sums have 0.45 and 0.15.
     """
-    period, damping = wave(length, length / across, ps.ContinuityDensity(delta))
+    period, damping = fitted(length, length / across, ps.ContinuityDensity(delta))
     assert period == pytest.approx(1.0, abs=0.01)
     # Viscosity: nu = alpha h c / 8, and 2 nu k^2 of a wave of 1 at 48 across is 0.37 / s.
     assert damping < 0.2

@@ -12,8 +12,8 @@ rest density, whose small changes rounding leaves alone.
     D_i = delta h c sum_j V_j (2 (rho_j - rho_i) x_ji / r^2 - g_i - g_j) . grad_i W_ij
 
 evens out densities (Molteni and Colagrossi 2009) but for what is linear in space, by the gradients
-g = M^-1 sum_j V_j (rho_j - rho_i) grad_i W_ij, M = sum_j V_j x_ji grad_i W_ij (Antuono et al. 2010,
-eqs. 6 to 9). Both are sums over particles alone: what is linear up to a wall or a surface stays so.
+g = M^-1 sum_j V_j (rho_j - rho_i) grad_i W_ij, M = sum_j V_j x_ji grad_i W_ij (Antuono et al.
+2010). Both are sums over particles alone: what is linear up to a wall or a surface stays so.
 """
 
 import functools

@@ -12,8 +12,8 @@ from cases.continuity import SOUND, H, loose, simulate, stirred
 
 
 def summed(x, held, count=8):
-    """sum_j m_j W_ij over particles and their images, mirrored or shifted, in the unit square."""
-    images = [-x, x, 2 - x] if held else [x - 1, x, x + 1]
+    """sum_j m_j W_ij over particles and their images, mirrored or shifted."""
+    images = [-x, x] if held else [x - 1, x, x + 1]
     total = 0.0
     for a, b in itertools.product(images, images):
         r = np.hypot(x[:, None, 0] - a[None, :, 0], x[:, None, 1] - b[None, :, 1])
