@@ -35,6 +35,7 @@ from .interactions.electrostatics.electrostatics import Electrostatics
 from .interactions.fields.field_force import FieldForce
 from .interactions.fields.poisson import PoissonField
 from .interactions.fields.wave import GridField
+from .interactions.fluid.density.continuity import ContinuityDensity
 from .interactions.fluid.equations_of_state import (
     EquationOfState,
     IdealGas,
@@ -105,6 +106,7 @@ __all__ = [
     "ConstraintBase",
     "ConstraintForce",
     "Contact",
+    "ContinuityDensity",
     "Coulomb",
     "CubicSpline",
     "Dihedrals",

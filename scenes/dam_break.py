@@ -26,6 +26,7 @@ def build(
     tank: float = 2.5,
     viscosity: float = 0.05,
     seed: int = 0,
+    density: ps.ContinuityDensity | None = None,
 ) -> ps.Scene:
     """Water in the left of a tank.
 
@@ -36,6 +37,7 @@ def build(
         tank: Length of the tank [m].
         viscosity: Artificial viscosity, alpha.
         seed: Of how the water stirs at first, by a thousandth of the fastest speed.
+        density: By continuity; None: summed.
     """
     height = 2 * width
     fastest = np.sqrt(2 * GRAVITY * height)
@@ -54,6 +56,7 @@ def build(
             equation_of_state=ps.Tait(sound_speed=10 * fastest),
             smoothing="wendland_c2",
             viscosity=ps.ArtificialViscosity(viscosity),
+            density=density,
         )
     )
     scene.add_constraint(ps.BoxBoundary((0, 0, 0), (tank, 1.3 * height, depth), slip=False))

@@ -15,12 +15,15 @@ settings = ps.Settings(dt=0.04, substeps=60)
 SOUND = 14.0  # speed of sound
 
 
-def build(across: int = 60, viscosity: float = 0.02) -> ps.Scene:
+def build(
+    across: int = 60, viscosity: float = 0.02, density: ps.ContinuityDensity | None = None
+) -> ps.Scene:
     """The drop while it is round.
 
     Args:
         across: Particles across the drop.
         viscosity: Artificial viscosity, alpha.
+        density: By continuity; None: summed.
     """
     spacing = 2.0 / across
     scene = ps.Scene(up_axis="z")
@@ -36,6 +39,7 @@ def build(across: int = 60, viscosity: float = 0.02) -> ps.Scene:
             rest_density=mass / spacing**2,
             equation_of_state=ps.Tait(SOUND),
             viscosity=ps.ArtificialViscosity(viscosity),
+            density=density,
             dimension=2,
         )
     )

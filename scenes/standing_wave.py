@@ -16,21 +16,26 @@ frames = 60
 settings = ps.Settings(dt=0.02, substeps=75)
 
 
-def build(length: float = 1.0, spacing: float = 1 / 48, speed: float = 0.2) -> ps.Scene:
+def build(
+    length: float = 1.0, spacing: float = 1 / 48, speed: float = 0.2,
+    density: ps.ContinuityDensity | None = None,
+) -> ps.Scene:  # fmt: skip
     """The water, level.
 
     Args:
         length: Of the wave [m].
         spacing: Of the particles [m].
         speed: Of the surface at the walls [m/s].
+        density: By continuity; None: summed.
     """
     scene = ps.Scene()
     x = ps.sample.box((0, -DEPTH, 0), (length / 2, 0, 0), spacing)
     pressure = DENSITY * GRAVITY * -x[:, 1]
-    density = DENSITY * (1 + 7 * pressure / (DENSITY * SOUND**2)) ** (1 / 7)  # by Tait
+    rho = DENSITY * (1 + 7 * pressure / (DENSITY * SOUND**2)) ** (1 / 7)  # by Tait
+    start = {} if density is None else {"start_density": rho}
     scene.add_particles(
-        x, velocity=speed * flow(x, length), mass=density * spacing**2, radius=0.5 * spacing,
-        group="water",
+        x, velocity=speed * flow(x, length), mass=rho * spacing**2, radius=0.5 * spacing,
+        group="water", **start,
     )  # fmt: skip
     scene.add_interaction(ps.UniformGravity((0, -GRAVITY, 0)))
     scene.add_interaction(
@@ -39,6 +44,7 @@ def build(length: float = 1.0, spacing: float = 1 / 48, speed: float = 0.2) -> p
             rest_density=DENSITY,
             equation_of_state=ps.Tait(SOUND),
             viscosity=ps.ArtificialViscosity(0.01),
+            density=density,
             dimension=2,
         )
     )

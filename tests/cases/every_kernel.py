@@ -183,6 +183,8 @@ SCENES = {
         lambda: fluid(BOX, smoothing="cubic_spline", equation_of_state=ps.Polytrope(1.0, 1.5),
                       viscosity=[ps.ArtificialViscosity(0.1), ps.ParticleShifting(1.0)]), {}
     ),
+    "continuity": (lambda: fluid(None, density=ps.ContinuityDensity()), VERLET),
+    "continuity_beside_walls": (lambda: fluid(None, [BELT], density=ps.ContinuityDensity()), {}),
     "heated_fluid": (heated, {}),
     "gas_dynamics": (lambda: heated(smoothing_length=ps.AdaptiveSmoothing()), VERLET),
     "constraints": (lambda: constrained(None, breaks=False, bounces=True), {"ledger": True}),
@@ -194,5 +196,5 @@ SCENES = {
 
 EVERY_KERNEL = (
     "forces", "charged", "damped", "periodic_forces", "fluid", "constraints", "breaking",
-    "gas_dynamics", "star_collision", "tree",
+    "gas_dynamics", "star_collision", "tree", "continuity",
 )  # fmt: skip

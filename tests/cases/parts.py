@@ -124,8 +124,8 @@ LAWS = {
 }
 PLAIN = {**TUPLES, "group": None, "exponents": (12, 6)}
 LEFT_OUT = {"break_force", "inequality", "tension_only", "truncation", "inside", "potential",
-            "smoothing", "dimension", "viscosity", "pivot", "drawn", "mixing", "groups", "exclude",
-            "switch", "method", "tolerance", "slip", ("Electrostatics", "cutoff"),
+            "smoothing", "density", "dimension", "viscosity", "pivot", "drawn", "mixing", "groups",
+            "exclude", "switch", "method", "tolerance", "slip", ("Electrostatics", "cutoff"),
             ("Electrostatics", "damping"), ("Gravity", "cutoff")}  # fmt: skip
 # What is of one machinery is tried by its kin in every run, and itself in the long one.
 KIN = {

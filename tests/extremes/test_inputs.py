@@ -53,6 +53,7 @@ PARTS = {
         "level": 0.0,
     },
     ps.Contact: {"friction": 0.1, "restitution": 0.5, "compliance": 1e-6},
+    ps.ContinuityDensity: {"diffusion": 0.1},
     ps.Coulomb: {"cutoff": 2.0, "damping": 0.1},
     ps.Dihedrals: {"quadruples": [(0, 1, 2, 3)], "law": wave, "level": 1.0},
     ps.Distance: {"pairs": [(0, 1)], "rest_length": 1.0, "compliance": 0.1, "damping": 0.1,

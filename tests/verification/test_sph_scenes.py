@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
+from cases.waves import fitted
 from particlesim.scenes import (
     elliptical_drop,
     poiseuille,
@@ -142,26 +143,6 @@ def test_elliptical_drop_converges():
 # Waves --------------------------------------------------------------------------------------------
 
 
-def period(length, spacing):
-    """Of a standing wave over the exact one, by the damped oscillation that fits three of them."""
-    exact = standing_wave.period(length)
-    dt = exact / 40
-    substeps = int(np.ceil(dt / (0.35 * 2 * spacing / standing_wave.SOUND)))
-    sim = simulate(standing_wave, substeps, dt, length=length, spacing=spacing)
-    signal = [standing_wave.amplitude(sim)]
-    for _ in range(120):
-        sim.step()
-        signal.append(standing_wave.amplitude(sim))
-    t, best = dt * np.arange(121), (np.inf, 0.0)
-    for ratio in np.linspace(0.9, 1.15, 251):
-        for damping in np.linspace(0.0, 2.0, 41):
-            phase, fall = 2 * np.pi * t / (ratio * exact), np.exp(-damping * t)
-            basis = np.stack([fall * np.cos(phase), fall * np.sin(phase)], axis=1)
-            left = signal - basis @ np.linalg.lstsq(basis, signal, rcond=None)[0]
-            best = min(best, ((left**2).sum(), ratio))
-    return best[1]
-
-
 @slow
 @pytest.mark.parametrize("length", [1.0, 2.0])
 def test_standing_wave(length):
@@ -173,7 +154,7 @@ def test_standing_wave(length):
     assert standing_wave.period(length) == pytest.approx(
         {1: 0.800308, 2: 1.133917}[length], abs=1e-6
     )
-    errors = [abs(period(length, length / n) - 1) for n in (48, 96)]
+    errors = [abs(fitted(length, length / n)[0] - 1) for n in (48, 96)]
     assert errors[1] < 0.02 and errors[1] < errors[0]
 
 

@@ -51,8 +51,8 @@ def own_weight(weight: wp.Function, precision: Precision, data: Any, params: Any
 
 @functools.cache
 def keep_state(
-    own: wp.Function, pressure: wp.Function, sound_speed: wp.Function | None, hot: bool,
-    several: bool, precision: Precision, data: Any, params: Any, out: Any,
+    pressure: wp.Function, sound_speed: wp.Function | None, hot: bool, several: bool,
+    own: wp.Function, precision: Precision, data: Any, params: Any, out: Any,
 ) -> wp.Function:  # fmt: skip
     """Store: density and pressure of the particle, and (m, rho, P/rho^2, c) in slot order.
 

@@ -140,6 +140,7 @@ def distance_kernel(surface: Surface) -> wp.Kernel:
         begin: int,
         stride: int,
         slack: wp.array(dtype=wp.float32),
+        closing: wp.array(dtype=wp.float32),
         o: Near,
     ):
         i = first + wp.tid()
@@ -147,8 +148,7 @@ def distance_kernel(surface: Surface) -> wp.Kernel:
             w = pairs.world[i]
             d, N = sight(x[i], parameters[w], pose, w)
             own = each(o.distance[i])
-            n_own = normals(o.normal[i])
-            rate = each()
+            n_own, rate = normals(o.normal[i]), each()
             rated = o.rate.shape[0] > 0
             if rated:
                 rate = each(o.rate[i])
@@ -166,6 +166,8 @@ def distance_kernel(surface: Surface) -> wp.Kernel:
                         if wp.static(moving):
                             u = u - velocity(x[i], pose[w])
                         rate[k] = wp.dot(u, n)
+                        if closing.shape[0] > 0:
+                            rate[k] += real(closing[w * stride + begin + a])
                         if wp.static(sticky):
                             if nearest:
                                 o.against[i] = u
@@ -259,7 +261,7 @@ def forget_kernel() -> wp.Kernel:
 
 @functools.cache
 def ease_kernel(precision: Precision) -> wp.Kernel:
-    """Kernel: slack runs out."""
+    """Kernel: slack runs out; at which rate is kept where somebody asks."""
     real = precision.scalar
     ease, Easing = ease_function(precision), easing_type(precision)
 
@@ -271,10 +273,13 @@ def ease_kernel(precision: Precision) -> wp.Kernel:
         dt: real,
         stride: int,
         slack_io: wp.array(dtype=wp.float32),
+        closing_out: wp.array(dtype=wp.float32),
     ):
         k = first + wp.tid()
         slack = slack_io[k]
         if slack > 0.0:
             slack_io[k] = wp.float32(ease(real(slack), rest[k / stride], dt, easing))
+        if closing_out.shape[0] > 0:
+            closing_out[k] = (slack_io[k] - slack) / wp.float32(dt)
 
     return ease_slack

@@ -1,8 +1,9 @@
-"""What a fluid has of its own that changes in time: heat, smoothing lengths, slack of walls."""
+"""What a fluid has of its own that changes in time: heat, densities, lengths, slack of walls."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,13 @@ from ... import validate
 from ...engine.model import Model
 from ...engine.state import State
 from ...scene.part import Interaction, Part
+from .density.continuity import Continuity, ContinuityDensity
+from .equations_of_state import EquationOfState
 from .heat import ENERGY, Heat
 from .interfaces.fluids import Fluids
 from .lengths import LENGTH, AdaptiveSmoothing, Lengths
 from .smoothing.smoothing_function import Smoothing
+from .viscosities import Viscosity
 from .walls import Walls
 
 
@@ -30,7 +34,11 @@ class Evolving(Interaction):
     fluids: Fluids
     pairs: Any  # the list, once prepared
     parameters: dict[str, Any]
+    equation_of_state: EquationOfState
+    viscosity: tuple[Viscosity, ...]
     adaptive: AdaptiveSmoothing | None = None
+    density: ContinuityDensity | None = None
+    continuity: Continuity | None = None  # once prepared
     heat: Heat | None = None  # once attached
     lengths: Lengths | None = None  # once prepared
     walls: Walls
@@ -44,6 +52,37 @@ class Evolving(Interaction):
         self.requires |= {ENERGY, "inverse_mass"}
         self.evolves = frozenset({ENERGY})
         self.reads_velocity = self.conservative = True
+
+    def check_density(self) -> None:
+        """By continuity goes what has one length and one rest density, and moves as it is fast."""
+        if self.density is None:
+            return
+        if not isinstance(self.density, ContinuityDensity):
+            raise TypeError(
+                f"{self.name}: density must be a ContinuityDensity or None, got {self.density!r}; "
+                "give ContinuityDensity(0.1)."
+            )
+        drifting = [each.name for each in self.viscosity if each.drifts]
+        for bad, what, got in (
+            (self.adaptive, "with one smoothing length", "an AdaptiveSmoothing"),
+            (self.fluids.several, "with one fluid", f"{len(self.fluids.groups)} fluids"),
+            (self.hot, "without internal energy", self.equation_of_state.name),
+            (drifting, "with viscosities that move no particles", drifting),
+            (not self.fluids.densities, "with a rest_density", None),
+        ):
+            if bad:
+                raise validate.fail(
+                    self.name, "density", f"be a ContinuityDensity only {what}", got,
+                    "leave one of both out" if got else "give it, for densities start there",
+                )  # fmt: skip
+        self.parameters |= {"density_diffusion": self.density.diffusion}
+        self.requires |= {"time"}
+        self.reads_velocity = True
+        self.conservative = self.conservative and not self.density.diffusion
+
+    def still(self) -> AbstractContextManager[None]:
+        """Forces are taken at other velocities, and densities by continuity stay."""
+        return nullcontext() if self.continuity is None else self.continuity.still()
 
     def take_length(self, given: Any) -> dict[str, float]:
         """The parameter that smoothing lengths follow from."""
@@ -78,6 +117,8 @@ class Evolving(Interaction):
             self.heat.begin(dt)
 
     def advance(self, state: State, dt: float) -> None:
+        if self.continuity is not None:
+            self.continuity.advance()
         if self.heat is not None:
             self.heat.advance(dt)
         if self.walls:
@@ -92,13 +133,18 @@ class Evolving(Interaction):
 
     def persistent(self) -> dict[str, wp.array]:
         kept = {} if self.heat is None else self.heat.persistent()
-        return {**kept, **self.walls.easing.persistent()} if self.walls else kept
+        if self.continuity is not None:
+            kept |= self.continuity.persistent()
+        return {**kept, **self.walls.persistent()} if self.walls else kept
 
     def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
-        return self.walls.worlds if name == "slack" else super().worlds(name, array)
+        of_sides = name in ("slack", "closing")
+        return self.walls.worlds if of_sides else super().worlds(name, array)
 
     def reset(self, worlds: Sequence[int]) -> None:
         self.forget(self.persistent(), worlds)
+        if self.continuity is not None:
+            self.continuity.reset(worlds)
         if self.lengths is not None:
             self.lengths.reset(worlds)
         if self.walls:

@@ -39,7 +39,7 @@ def fluid_limits(part: Any, probe: Probe) -> list[Limit]:
     c = _heard(part, probe, part.sound_speeds(probe))
     h = each["smoothing_length"] = part.smoothing_lengths(rows)
     omega = c * steepest(part.smoothing, part.dimension) / h
-    gamma = _damping_rates(part, probe, each, c)
+    gamma = _damping_rates(part, probe, each, c) + _spreading_rates(part, each, c)
     k = int(np.argmax(gamma + np.sqrt(gamma**2 + 4.0 * omega**2)))  # by either integrator
     reason = f"h = {h[k]:.4g}, c = {c[k]:.4g}, omega = {omega[k]:.4g} /s, gamma = {gamma[k]:.4g} /s"
     dt = probe.loop.integrator.largest_step(float(omega[k]) ** 2, float(gamma[k]))
@@ -121,9 +121,32 @@ def _damping_rates(
     if not forces:
         return np.zeros_like(c)
     if not (len(forces) == 1 and isinstance(forces[0], ArtificialViscosity)):
-        return np.full_like(c, probe.damping(part))
+        with part.still():
+            return np.full_like(c, probe.damping(part))
     strength = each["viscosity_alpha"] * c + 2.0 * each["viscosity_beta"] * _meeting(part, probe)
     return damping(part.smoothing, part.dimension) * strength / each["smoothing_length"]
+
+
+def _spreading_rates(part: Any, each: dict[str, np.ndarray], c: np.ndarray) -> np.ndarray:
+    """By how fast what evens out densities takes a wave away, which its gradients hardly see.
+
+    lambda = 2 delta c h int (1 - cos k.x) |W'| / r d^dx, at most, of each member.
+    """
+    if part.density is None:
+        return np.zeros_like(c)
+    spread = 2.0 * spreading(part.smoothing, part.dimension) * each["density_diffusion"]
+    return spread * c / each["smoothing_length"]
+
+
+@functools.cache
+def spreading(smoothing: Smoothing, dimension: int) -> float:
+    """max over k of int (1 - cos k.x) |W'| / r d^dx h^2."""
+    q, w = _samples(smoothing)
+    slope = np.abs(np.gradient(w, q)) / q
+    shell = slope * (
+        _shells(0.0 * q, q, dimension) - _shells(WAVENUMBERS[:, None] * q, q, dimension)
+    )
+    return float(shell.sum(axis=1).max() * smoothing.support / POINTS)
 
 
 def steepest(smoothing: Smoothing, dimension: int) -> float:
@@ -135,15 +158,18 @@ def steepest(smoothing: Smoothing, dimension: int) -> float:
 def transform(smoothing: Smoothing, dimension: int) -> np.ndarray:
     """W_hat(k) = int W cos(k.x) d^dx, 1 at k = 0, at ``WAVENUMBERS`` / h."""
     q, w = _samples(smoothing)
-    angles = WAVENUMBERS[:, None] * q
-    if dimension == 1:
-        shell = 2.0 * np.cos(angles)
-    elif dimension == 2:
-        turn = (np.arange(64) + 0.5) * np.pi / 64
-        shell = 2.0 * np.pi * q * np.cos(angles[..., None] * np.cos(turn)).mean(axis=-1)
-    else:
-        shell = 4.0 * np.pi * q**2 * np.sinc(angles / np.pi)
+    shell = _shells(WAVENUMBERS[:, None] * q, q, dimension)
     return (shell * w).sum(axis=1) * smoothing.support / POINTS
+
+
+def _shells(angles: np.ndarray, q: np.ndarray, dimension: int) -> np.ndarray:
+    """Of shells of radius q their surface times the mean of cos(k.x), for these k q."""
+    if dimension == 1:
+        return 2.0 * np.cos(angles)
+    if dimension == 2:
+        turn = (np.arange(64) + 0.5) * np.pi / 64
+        return 2.0 * np.pi * q * np.cos(angles[..., None] * np.cos(turn)).mean(axis=-1)
+    return 4.0 * np.pi * q**2 * np.sinc(angles / np.pi)
 
 
 @functools.cache

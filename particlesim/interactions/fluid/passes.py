@@ -14,18 +14,19 @@ from ...engine.neighbors.lists import Neighbors
 from ...engine.neighbors.verlet import VerletList
 from ...engine.probe import Probe
 from ...engine.state import State
+from ...kernels.interactions.fluid import continuity as of_continuity
+from ...kernels.interactions.fluid import images
 from ...kernels.interactions.fluid import lengths as of_lengths
 from ...kernels.interactions.fluid import sph as kernels
 from ...kernels.interactions.fluid.laws import bound_law
 from ..pair_loop import PairLoop
-from .equations_of_state import EquationOfState
+from .density.continuity import Continuity
 from .evolving import Evolving
 from .heat import ENERGY, Heat, check_energies
 from .lattice import lattice_sums, spacings
 from .lengths import LENGTH, Lengths
 from .limits import fluid_limits
 from .starts import complaint
-from .viscosities import Viscosity
 from .viscous_passes import Drift, Switch
 from .walls import Pass, Walls
 
@@ -35,9 +36,6 @@ COINCIDENT = 1e-6  # closer than this, in parts of h, particles count as coincid
 class Passes(Evolving):
     """The engine's side of :class:`~particlesim.SPH`, which describes a fluid."""
 
-    equation_of_state: EquationOfState
-    viscosity: tuple[Viscosity, ...]
-    parameters: dict[str, Any]
     sources: dict[str, dict[str, str]]
 
     @property
@@ -52,7 +50,7 @@ class Passes(Evolving):
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
         columns = self.columns(self.parameters)
-        read = {"velocity": self.moving, ENERGY: self.hot}
+        read = {"velocity": self.moving or self.density is not None, ENERGY: self.hot}
         names = {"mass"} | {name for name, on in read.items() if on}
         if self.adaptive is None:
             self.pairs = cast(VerletList, neighbors.of(self, names))  # as there is a cutoff
@@ -62,6 +60,8 @@ class Passes(Evolving):
             self.pairs = self.lengths.request(neighbors, names)
             columns |= self.lengths.columns()
             least, most = self.lengths.least, self.lengths.most
+        if self.density is not None:
+            self.continuity = Continuity(self, model)
         if self.hot:
             check_energies(self.name, model, self.pairs.members_host)
         self.walls = Walls(self, model)
@@ -74,7 +74,7 @@ class Passes(Evolving):
         if self.lengths is None:
             columns["inverse_h"] = 1.0 / most
             columns["sigma"] = self.smoothing.sigma / most**self.dimension
-            if self.fluids.densities:
+            if self.fluids.densities and self.density is None:
                 sums = lattice_sums(self, model, most)
                 columns |= {
                     name: sums * columns[name] for name in self.fluids.fields["rest_density"]
@@ -90,8 +90,10 @@ class Passes(Evolving):
         # Mass, density, P / rho^2 and sound speed of each slot, together as they are read together.
         self.slot_state = self.pairs.array(precision.vector(4))
         fields = {"x": held["position"], "state": self.slot_state, **self.fluids.read(held["mass"])}
-        if self.moving:
+        if self.moving or self.continuity is not None:
             fields["v"] = held["velocity"]
+        if self.continuity is not None:
+            fields |= self.continuity.attach(state)
         if self.hot:
             fields["u"] = held[ENERGY]
         if self.lengths is not None:
@@ -121,6 +123,8 @@ class Passes(Evolving):
             given = self.slope, self.laws, self.switch is not None, self.dimension
             heat = functools.partial(kernels.heat_term, *given)
             self.density_term = kernels.density_term(self.weight, *types)
+            if self.continuity is not None:
+                self.continuity.over(self.loop, self.slope, self.laws)
             pull, dragged = self.pull(*types), self.dragged(*types)
             self.force_term = kernels.force_term(pull, dragged, self.moving, self.dimension, *types)
         if self.hot:
@@ -139,6 +143,13 @@ class Passes(Evolving):
         if "drag" not in self.laws:
             return None
         return kernels.drag_function(self.slope, self.laws["drag"], self.fluids.several, *types)
+
+    def beside_walls(self, seen: Any, *types: Any) -> tuple[Any, wp.Function]:
+        """The term of densities over a pair and its images, and that of a particle's own."""
+        if self.continuity is not None:
+            return self.continuity.beside_walls(seen, *types)
+        term = images.density_term(self.weight, seen, *types)
+        return term, images.own_weight(self.weight, seen, *types)
 
     def _laws(self) -> dict[str, wp.Function]:
         """The parts' laws as functions of their variables and the fluid's parameters."""
@@ -176,10 +187,15 @@ class Passes(Evolving):
             self.lengths.search(state, laws, self.slot_state)
             return
         out = {"state": self.slot_state, "rho": state.density, "pressure": state.pressure}
-        own = kernels.own_weight(self.weight, *self._types)
-        kept = (*laws, self.hot, self.fluids.several)
-        store = functools.partial(kernels.keep_state, own, *kept)
-        self.walls.sum_density(Pass(self.loop, self.density_term, store, out), kept)
+        if self.continuity is not None:
+            self.continuity.look()
+            out["excess"] = self.continuity.found
+            term, own = self.continuity.term, of_continuity.no_rate(*self._types)
+            keep = functools.partial(of_continuity.keep_density, *laws)
+        else:
+            term, own = self.density_term, kernels.own_weight(self.weight, *self._types)
+            keep = functools.partial(kernels.keep_state, *laws, self.hot, self.fluids.several)
+        self.walls.sum_density(Pass(self.loop, term, functools.partial(keep, own), out), keep)
         if self.switch:
             self.switch.sum()
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ... import validate
+from .density.continuity import ContinuityDensity
 from .equations_of_state import EquationOfState
 from .heat import ENERGY
 from .interfaces.fluids import FLUID, PAIR, Fluids
@@ -27,7 +28,7 @@ VARIABLES = {
 
 
 class SPH(Passes):
-    r"""A fluid: density by summation, symmetric pressure force, viscosity.
+    r"""A fluid: density by summation or continuity, symmetric pressure force, viscosity.
 
         rho_i = sum_j m_j W_ij                    (over all j in reach, i itself included)
         F_ij = -m_i m_j (P_i/rho_i^2 + P_j/rho_j^2 + Pi_ij) grad_i W_ij
@@ -84,13 +85,15 @@ class SPH(Passes):
         viscosity: :class:`ArtificialViscosity`, :class:`LaminarViscosity`, :class:`XSPH` or another
             ``Viscosity``, or several of different kinds, with :class:`ParticleShifting`; None:
             inviscid.
+        density: None: summed as above; or a :class:`ContinuityDensity`: it follows the motion.
         dimension: d of the normalisation of W: 3; 2 for scenes in a plane, whose density is a mass
             per area; 1 for scenes on a line. The plane is x-y and the line x where coincident
             particles are to stay in it.
 
     Raises:
         ValueError: A value out of range, a name that is not known, a rest density missing; several
-            fluids with heat or with an :class:`AdaptiveSmoothing`.
+            fluids with heat or with an :class:`AdaptiveSmoothing`; a :class:`ContinuityDensity`
+            with any of these, or with a viscosity that has particles drift.
 
     Example:
         >>> from particlesim import Scene, Settings, Simulation, Tait, sample
@@ -112,7 +115,8 @@ class SPH(Passes):
         equation_of_state: EquationOfState | Sequence[EquationOfState],
         rest_density: float | Sequence[float] | None = None,
         smoothing: str | SmoothingFunction = "wendland_c2",
-        viscosity: Viscosity | Sequence[Viscosity] | None = None, dimension: int = 3,
+        viscosity: Viscosity | Sequence[Viscosity] | None = None,
+        density: ContinuityDensity | None = None, dimension: int = 3,
     ):  # fmt: skip
         self.group = group
         if dimension not in (1, 2, 3):
@@ -125,6 +129,7 @@ class SPH(Passes):
         self.equation_of_state = self.fluids.states[0]  # whose laws are those of all
         self.viscosity = several(self.name, viscosity)
         self.reads_velocity, self.conservative = bool(self.viscosity), not self.viscosity
+        self.density = density
         self._check_adaptive()
         if self.fluids.densities:
             self.parameters |= self.fluids.keep("rest_density", self.fluids.densities)
@@ -137,6 +142,7 @@ class SPH(Passes):
         self._check_several()
         if self.hot:
             self.keep_heat()
+        self.check_density()
 
     def _check_adaptive(self) -> None:
         """Of viscosities only those along the pair know of lengths of particles' own."""
@@ -196,6 +202,7 @@ class SPH(Passes):
         parts = [self.equation_of_state, *self.viscosity]
         laws = [law.func for part in parts for law in part.laws.values()]
         switched = tuple(each.switched for each in self.viscosity)
+        switched += (self.density is not None and self.density.diffusion > 0,)
         own = self.smoothing.kind, self.dimension, tuple(self.parameters)
         return (type(self), *laws, switched, *own)
 

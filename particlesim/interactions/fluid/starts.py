@@ -139,7 +139,9 @@ def _spacing(fluid: Any, members: np.ndarray) -> np.ndarray:
 
 
 def _densities(fluid: Any) -> np.ndarray:
-    """Densities at the present positions, of all particles; the state's stay as they were."""
+    """Sums at the present positions, of all particles; the state's densities stay."""
+    if fluid.continuity is not None:
+        return fluid.continuity.summed(fluid.weight)
     kept = [(each, wp.clone(each)) for each in (fluid.state.density, fluid.state.pressure)]
     fluid.update_density()
     rho = fluid.state.density.numpy().astype(np.float64)

@@ -15,7 +15,7 @@ from ...engine.model import Model, filled, structure_of
 from ...engine.state import State
 from ...kernels.interactions.fluid import images, presses
 from ...kernels.interactions.fluid import walls as kernels
-from ...kernels.interactions.fluid.sph import DIRECTIONS, keep_state
+from ...kernels.interactions.fluid.sph import DIRECTIONS
 from ...scene.constraint_base import ConstraintBase
 from ...scene.part import Part
 from ..pair_loop import PairLoop
@@ -87,7 +87,8 @@ class Walls:
         self.struct = kernels.near_type(precision, self.total)()
         self.struct.distance = self.distance
         self.struct.rate = none if self.rate is None else self.rate
-        sticks = [wall.sticky and moving for wall in self.walls]
+        viscous = bool(self.fluid.viscosity)
+        sticks = [wall.sticky and viscous for wall in self.walls]
         carried = any(on and len(wall.pose) for on, wall in zip(sticks, self.walls, strict=True))
         vec3, count = precision.vec3, pairs.count if carried else 0
         self.against = pairs.array(vec3) if count else wp.empty(0, dtype=vec3, device=model.device)
@@ -101,6 +102,9 @@ class Walls:
         sides = [len(wall.places) for wall in self.walls]
         self.stride, self.begins = sum(sides), np.cumsum([0, *sides])[:-1].tolist()
         self.easing = Easing(model, model.world_count * self.stride, wp.float32, ends=1)
+        # By continuity the density answers to a wall that comes back.
+        count = 0 if self.fluid.continuity is None else len(self.easing.slack)
+        self.closing = wp.zeros(count, dtype=wp.float32, device=model.device)
         self.rest = model.array(0.5 * self.fluid.spacings, precision.scalar)
         self._make_terms(fields)
 
@@ -109,14 +113,19 @@ class Walls:
         if dt <= 0:
             return
         easing = self.easing
-        inputs = [self.rest, easing.struct, dt, self.stride, easing.slack]
+        inputs = [self.rest, easing.struct, dt, self.stride, easing.slack, self.closing]
         kernel = kernels.ease_kernel(self.model.precision)
         launch(kernel, len(easing.slack), inputs, self.model.device)
         call(easing.unmark)
 
+    def persistent(self) -> dict[str, wp.array]:
+        """What outlives a substep."""
+        closing = {"closing": self.closing} if len(self.closing) else {}
+        return {**self.easing.persistent(), **closing}
+
     @property
     def worlds(self) -> np.ndarray:
-        """The world of each row of the slack."""
+        """The world of each row of the slack, and of how fast it closes."""
         return np.repeat(np.arange(self.model.world_count), self.stride)
 
     def _make_terms(self, fields: Mapping[str, wp.array]) -> None:
@@ -135,8 +144,7 @@ class Walls:
         self.seen = images.Seen(self.total, self.sticky, against=against)
         one = None if self.sticky is None else self.sticky[:1]
         self.ways = [images.Seen(self.total, one, True, against), self.seen]
-        self.density_terms = [images.density_term(fluid.weight, each, *types) for each in self.ways]
-        self.own_weights = [images.own_weight(fluid.weight, each, *types) for each in self.ways]
+        self.sums = [fluid.beside_walls(each, *types) for each in self.ways]
         self.force_terms = [images.force_term(*pair, each, direction, *types) for each in self.ways]
         self.own_pushes = [images.own_push(*pair, each, *types) for each in self.ways]
 
@@ -164,21 +172,24 @@ class Walls:
         nowhere = kernels.nowhere_kernel(precision, self.total, fluid.Params)
         launch(nowhere, pairs.count, [pairs.pairs, fluid.params, v, self.struct], device)
         for begin, (surface, inputs) in zip(self.begins, seen, strict=True):
-            own = [*inputs, v, begin, self.stride, slack, self.struct]
+            own = [*inputs, v, begin, self.stride, slack, self.closing, self.struct]
             launch(kernels.distance_kernel(surface), pairs.count, own, device)
         alike = self.sticky is None or len(set(self.sticky)) == 1
         near = kernels.near_kernel(precision, self.total, alike, fluid.Params)
         launch(near, pairs.rows, [pairs.pairs, fluid.params, self.struct], device)
 
-    def sum_density(self, plain: Pass, laws: tuple[Any, ...]) -> None:
-        """The pass of densities, of which ``plain`` is that far from walls."""
+    def sum_density(self, plain: Pass, keep: Any) -> None:
+        """The pass of densities, of which ``plain`` is that far from walls.
+
+        ``keep`` makes the store of a particle's own term.
+        """
         if not self:
             plain.loop.sum(*plain[1:])
             return
         self.look()
         beside = [
-            Pass(self.loop, term, functools.partial(keep_state, own, *laws), plain.out)
-            for term, own in zip(self.density_terms, self.own_weights, strict=True)
+            Pass(self.loop, term, functools.partial(keep, own), plain.out)
+            for term, own in self.sums
         ]
         self.sum(plain, *beside)
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import warp as wp
 
-from ....kernels.interactions.fluid import dfsph as kernels
 from ....kernels.interactions.fluid import images
+from ....kernels.interactions.fluid.incompressible import dfsph as kernels
 from ....kernels.interactions.fluid.seen import Seen
 from ....kernels.interactions.fluid.sph import DIRECTIONS, force_term
 from ....kernels.interactions.fluid.walls import normals_of

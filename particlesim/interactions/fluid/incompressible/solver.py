@@ -13,8 +13,8 @@ from ....engine.execution.launch import call, launch, repeat
 from ....engine.model import Model
 from ....engine.report import Solved
 from ....engine.state import State
-from ....kernels.interactions.fluid import pressure as kernels
-from ....kernels.interactions.fluid import pressure_motion as motion
+from ....kernels.interactions.fluid.incompressible import pressure as kernels
+from ....kernels.interactions.fluid.incompressible import pressure_motion as motion
 from .limits import first_step
 from .passes import PressurePasses
 

@@ -4,8 +4,8 @@ import functools
 
 import warp as wp
 
-from ...precision import Precision, register
-from .walls import normals_of
+from ....precision import Precision, register
+from ..walls import normals_of
 
 
 @functools.cache

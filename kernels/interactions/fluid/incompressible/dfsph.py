@@ -19,12 +19,12 @@ from typing import Any
 
 import warp as wp
 
-from ...engine.loops import Term, reader
-from ...precision import Precision, function
-from . import images
-from .seen import Seen, nearest_function
-from .sph import DIRECTIONS
-from .walls import normals_of
+from ....engine.loops import Term, reader
+from ....precision import Precision, function
+from .. import images
+from ..seen import Seen, nearest_function
+from ..sph import DIRECTIONS
+from ..walls import normals_of
 
 # What is read of a pair that coincides: it is taken as h apart, along a fixed direction.
 APART = [

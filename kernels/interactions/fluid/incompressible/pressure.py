@@ -15,8 +15,8 @@ from typing import Any
 
 import warp as wp
 
-from ...engine.loops import Pairs
-from ...precision import Precision, register
+from ....engine.loops import Pairs
+from ....precision import Precision, register
 
 BLOCK = 128  # slots that one thread sums
 LEAST, MOST = 0.05, 20.0  # of omega

@@ -1,0 +1,1 @@
+"""Kernels of an incompressible fluid."""

@@ -1,0 +1,1 @@
+"""Densities of a fluid that are a state of their own."""
