@@ -114,7 +114,17 @@ def test_every_case_says_what_it_is():
 
 
 ALIKE = {"cloth_10", "grains_200k", "lennard_jones_256k"}  # others' work, in other numbers
-LONG = {"cloth", "cost", "grains", "gravity", "gravity_tree", "lennard_jones", "memory", "wcsph"}
+LONG = {
+    "cloth",
+    "cost",
+    "grains",
+    "gravity",
+    "gravity_tree",
+    "lennard_jones",
+    "memory",
+    "wcsph",
+    "wcsph_splash",
+}
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ LONG = {
     "standing_wave", "star_collision", "taylor_green", "toy_star",
 }  # fmt: skip
 # Whose kernels nobody shares, and take long to make: all that is done with them is for that run.
-LATER = {"sloshing_tank"}
+LATER = {"floating_block", "poiseuille", "rising_bubble", "sloshing_tank"}
 
 
 def every():

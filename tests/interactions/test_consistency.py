@@ -84,7 +84,7 @@ def test_a_potential_belongs_to_its_force(force, potential, fits):
     [
         # 1 / r^2 at 5 and at 5 / 8^(1/3): a quarter.
         (lambda: ps.PairForce(pulling, cutoff=None), 0.25),
-        (lambda: ps.PairForce(growing, cutoff=None), 2.0),
+        pytest.param(lambda: ps.PairForce(growing, cutoff=None), 2.0, marks=pytest.mark.slow),
         (lambda: ps.PairPotential(decaying, cutoff=None, length=0.3), None),
         (lambda: ps.PairForce(growing, cutoff=2.0), None),
     ],

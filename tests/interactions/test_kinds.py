@@ -96,6 +96,7 @@ CASES = {
 }
 
 
+@pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("loops", ["vectorised", "plain"])
 def test_forces_are_those_of_the_kinds(case, loops, precision, device, monkeypatch):
