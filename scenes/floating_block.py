@@ -52,16 +52,10 @@ def build(spacing: float = 0.02, density: float = 500.0, lifted: float = 0.02) -
             dimension=2,
         )
     )
-    scene.add_constraint(ps.Distance(pairs(block, 1.5 * spacing) + wood.start))
+    scene.add_constraint(ps.Distance(ps.sample.links(block, 1.5 * spacing) + wood.start))
     sides = (0, 0, -np.inf), (TANK, 3 * DEPTH, np.inf)
     scene.add_constraint(ps.BoxBoundary(*sides))
     return scene
-
-
-def pairs(x: np.ndarray, reach: float) -> np.ndarray:
-    """Of points nearer to each other than that."""
-    apart = np.linalg.norm(x[:, None] - x, axis=-1)
-    return np.argwhere(np.triu(apart < reach, 1))
 
 
 def draught(sim: ps.Simulation) -> float:

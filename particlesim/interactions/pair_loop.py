@@ -49,6 +49,11 @@ class PairLoop:
         Data = structure_of(f"{name}Data", fields)
         return cls(model, pairs, Data, filled(Data, fields), Params, params)
 
+    @property
+    def types(self) -> tuple[Any, ...]:
+        """What terms are made for: the precision, and the structs of data and parameters."""
+        return self.model.precision, self.Data, self.Params
+
     def sum(
         self, term: Term, store: Callable[..., wp.Function], out: Mapping[str, wp.array]
     ) -> None:
@@ -63,7 +68,7 @@ class PairLoop:
         model = self.model
         Out = structure_of("PairSums", out)
         kernel = pair_kernel(
-            term, store(model.precision, self.Data, self.Params, Out), self.Data, self.Params, Out,
+            term, store(*self.types, Out), self.Data, self.Params, Out,
             model.precision, model.periodic, self.pairs.partners, model.vectorised,
         )  # fmt: skip
         inputs = [self.pairs.pairs, model.box, self.params, self.data, filled(Out, out)]

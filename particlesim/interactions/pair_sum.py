@@ -178,13 +178,13 @@ class PairSum:
         return {"x": self.pairs.fields["position"], **own, **kept}
 
     def _sum(self, array: wp.array, place: str) -> None:
-        precision, width = self.model.precision, WIDTHS[self.of_pair.law.returns]
+        width = WIDTHS[self.of_pair.law.returns]
         loop = PairLoop.over(
             self.model, self.pairs, "PairSum", self.fields, self.Params, self.params
         )
         kinds = {name: each.dtype for name, each in self.fields.items()}
         law, arguments = self._called(self.of_pair, {"_i": "i", "_j": "j"}, PAIR)
-        term = kernels.sum_term(law, arguments, width, kinds, precision, loop.Data, loop.Params)
+        term = kernels.sum_term(law, arguments, width, kinds, *loop.types)
         then, arguments = None, []
         if self.of_one is not None:
             total = {"total": "total[0]" if width == 1 else "total"}

@@ -166,11 +166,7 @@ class Settings:
         chosen = [name for name, is_open in left_open.items() if is_open]
         if len(chosen) == 2:
             raise validate.fail(
-                owner,
-                "substeps",
-                'be a number with dt="auto"',
-                self.substeps,
-                "choose one of them",
+                owner, "substeps", 'be a number with dt="auto"', self.substeps, "choose one of them"
             )
         if "dt" not in chosen:
             checked["dt"] = validate.number(owner, "dt", self.dt, minimum=0.0, unit="s")

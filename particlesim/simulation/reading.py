@@ -142,12 +142,14 @@ class Reading(Access):
         found = bound.read_force(constraint)
         if not bound.solid:
             return found
-        self.loop.know_forces()
         chosen = [constraint is bound or constraint is peer for peer in bound.peers]
-        pressing = [each.presses(bound) for each in self.interactions]
-        for each in pressing:
-            if each is not None:
-                found = found + each[chosen]
+        nothing = Interaction.presses
+        fluids = [each for each in self.interactions if type(each).presses is not nothing]
+        if fluids:
+            self.loop.know_forces()
+        for pressed in (each.presses(bound) for each in fluids):
+            if pressed is not None:
+                found = found + pressed[chosen]
         return found[0] if len(found) == 1 else found
 
     def broken(self, constraint: ConstraintBase) -> np.ndarray:

@@ -55,22 +55,6 @@ def gather_kernel(precision: Precision) -> wp.Kernel:
     return gather_excess
 
 
-@functools.cache
-def vectors_kernel(precision: Precision) -> wp.Kernel:
-    """Kernel: vectors of particles in slot order."""
-    vec3 = precision.vec3
-
-    @register
-    def gather_vectors(
-        first: int, order: wp.array(dtype=wp.int32), v: wp.array(dtype=vec3),
-        out: wp.array(dtype=vec3),
-    ):  # fmt: skip
-        i = first + wp.tid()
-        out[i] = v[order[i]]
-
-    return gather_vectors
-
-
 def gradient_term(slope: wp.Function, precision: Precision, data: Any, params: Any) -> Term:
     """Term of M, six numbers, and of the sum that it is to be divided out of, in units of h."""
     real, vec3, nine = precision.scalar, precision.vec3, precision.vector(9)
@@ -194,12 +178,14 @@ def gained_function(
 
 def _images(seen: Seen) -> list[str]:
     """Source that adds the gain of all images to ``found``."""
-    lines = [f"e{a} = real(4.0) * D_i[{a}] * D_j[{a}]" for a in range(seen.places)]
-    lines += [
-        f"a{a} = real(2.0) * (R_i[{a}] * D_j[{a}] + D_i[{a}] * R_j[{a}])"
-        for a in range(seen.places)
+    lines = [
+        *images.square_lines(seen),
+        *(
+            f"a{a} = real(2.0) * (R_i[{a}] * D_j[{a}] + D_i[{a}] * R_j[{a}])"
+            for a in range(seen.places)
+        ),
+        *(f"b{a} = real(4.0) * R_i[{a}] * R_j[{a}]" for a in range(seen.places)),
     ]
-    lines += [f"b{a} = real(4.0) * R_i[{a}] * R_j[{a}]" for a in range(seen.places)]
     for each in seen.sets:
         r2, a, b = (" + ".join(f"{name}{k}" for k in each) for name in "eab")
         lines.append(f"found += gain(i, approach + {a}, speed2 + {b}, r2 + {r2}, d, p)[1]")

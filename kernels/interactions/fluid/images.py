@@ -32,7 +32,7 @@ from .seen import Seen, nearest_function
 from .walls import near_type
 
 
-def _squares(seen: Seen) -> list[str]:
+def square_lines(seen: Seen) -> list[str]:
     """Source of 4 d_i d_j by place."""
     return [f"e{a} = real(4.0) * D_i[{a}] * D_j[{a}]" for a in range(seen.places)]
 
@@ -41,7 +41,7 @@ def _weights(seen: Seen) -> list[str]:
     """Source that adds w(q') of all images to ``found``."""
     squares = [" + ".join(f"e{a}" for a in each) for each in seen.sets]
     added = [f"found += weight(wp.sqrt(r2 + {square}) * p.inverse_h)" for square in squares]
-    return [*_squares(seen), *added]
+    return [*square_lines(seen), *added]
 
 
 def density_term(
@@ -158,7 +158,7 @@ def _approach(each: tuple[int, ...], sticky: tuple[bool, ...]) -> str:
 
 def pull_lines(seen: Seen, j: str, arm: str, also: list[str]) -> list[str]:
     """Source of w of every image, which b of each of its places takes up along an ``arm``."""
-    lines = [*_squares(seen), *(f"b{a} = real(0.0)" for a in range(seen.places))]
+    lines = [*square_lines(seen), *(f"b{a} = real(0.0)" for a in range(seen.places))]
     for n, each in enumerate(seen.sets):
         closing = "approach" if seen.sticky is None else _approach(each, seen.sticky)
         square = "".join(f" + e{a}" for a in each)

@@ -95,14 +95,15 @@ class AllPairs:
         """Copy these arrays into slot order; nothing to do where that is their own order."""
         if self.sorted:
             for name in sorted(names):
-                self._gather(state[name], self.fields[name])
+                self.sort(state[name], self.fields[name])
 
     def sort_held(self) -> None:
         """Bring what never changes into the order of the slots."""
         for source, target in self.held:
-            self._gather(source, target)
+            self.sort(source, target)
 
-    def _gather(self, source: wp.array, target: wp.array) -> None:
+    def sort(self, source: wp.array, target: wp.array) -> None:
+        """Copy an array by particle into slot order."""
         gather = kernels.gather_kernel(target.dtype)
         launch(gather, self.count, [self.order, source, target], self.model.device)
 

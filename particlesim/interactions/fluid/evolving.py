@@ -24,7 +24,7 @@ from .walls import Walls
 
 
 class Evolving(Interaction):
-    """The base of a fluid: each of both where it was asked for."""
+    """The base of a fluid: each of these where it was asked for."""
 
     model: Model
     state: State

@@ -189,7 +189,7 @@ class _Field:
         """dA_a/dx_b in slots, as nine numbers."""
         precision, loop = self.sph.model.precision, self._loop()
         gradient = self.sph.pairs.array(precision.vector(9))
-        term = kernels.gradient_term(self._slope, precision, loop.Data, loop.Params)
+        term = kernels.gradient_term(self._slope, *loop.types)
         store = functools.partial(kernels.keep_gradient, normalized)
         loop.sum(term, store, {"gradient": gradient})
         return gradient
@@ -199,7 +199,7 @@ class _Field:
         precision, normalized = self.sph.model.precision, gradient is not None
         loop = self._loop(**({} if gradient is None else {"gradient": gradient}))
         laplacian = self.sph.pairs.array(precision.vec3)
-        term = kernels.laplacian_term(self._slope, normalized, precision, loop.Data, loop.Params)
+        term = kernels.laplacian_term(self._slope, normalized, *loop.types)
         store = functools.partial(kernels.keep_laplacian, normalized, self.sph.dimension)
         loop.sum(term, store, {"laplacian": laplacian})
         return laplacian

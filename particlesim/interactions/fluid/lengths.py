@@ -127,8 +127,7 @@ class Lengths:
     def over(self, loop: PairLoop, weight: wp.Function, slope: wp.Function) -> None:
         """The loop that they are summed by."""
         self.loop, self.weight = loop, weight
-        precision = self.model.precision
-        self.term = kernels.length_term(weight, slope, precision, loop.Data, loop.Params)
+        self.term = kernels.length_term(weight, slope, *loop.types)
 
     def search(self, state: State, laws: Sequence[Any], slots: wp.array) -> None:
         """Lengths, densities and pressures at the present positions.

@@ -69,8 +69,10 @@ def acceleration_limit(
 
 def _speed_limit(part: Any, probe: Probe, h: np.ndarray) -> list[Limit]:
     """support h over the speed of the fastest and a typical one, in the frame of their world."""
+    if not probe.settings.adaptive:
+        return []
     speed = _meeting(part, probe)
-    if not probe.settings.adaptive or not speed > 0.0:
+    if not speed > 0.0:
         return []
     k = int(np.argmin(h))
     reach = part.smoothing.support * float(h[k])

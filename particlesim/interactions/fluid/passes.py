@@ -114,7 +114,7 @@ class Passes(Evolving):
             self.walls.attach(state, fields)
 
     def _make_terms(self) -> None:
-        self._types = types = self.model.precision, self.loop.Data, self.Params
+        self._types = types = self.loop.types
         if self.lengths is not None:
             viscous = self.slope, self.laws.get("term"), self.dimension
             heat = functools.partial(of_lengths.heat_term, *viscous)

@@ -27,7 +27,7 @@ class Switch:
     def term(self) -> Any:
         precision, loop = self.fluid.model.precision, self.fluid.loop
         slope = self.fluid.smoothing.slope.function(precision)
-        return kernels.turning_term(slope, precision, loop.Data, loop.Params)
+        return kernels.turning_term(slope, *loop.types)
 
     def sum(self) -> None:
         """From the velocities, densities and sound speeds of now."""
@@ -58,7 +58,7 @@ class Drift:
         fluid, precision, loop = self.fluid, self.fluid.model.precision, self.fluid.loop
         slope = fluid.smoothing.slope.function(precision)
         make = getattr(kernels, f"{self.part.drifts}_term")
-        return make(fluid.weight, slope, precision, loop.Data, loop.Params)
+        return make(fluid.weight, slope, *loop.types)
 
     def sum(self) -> None:
         """From the velocities and densities of now."""

@@ -137,7 +137,7 @@ class Walls:
             beside["against"] = self.against
         given = model, fluid.pairs, "FluidBesideWalls", beside, fluid.Params, fluid.params
         self.loop = PairLoop.over(*given)
-        self.types = types = model.precision, self.loop.Data, self.loop.Params
+        self.types = types = self.loop.types
         self.pulls, direction = fluid.pull(*types), DIRECTIONS[fluid.dimension]
         pair = self.pulls, fluid.dragged(*types)
         against = "against" if len(self.against) else "v"
@@ -231,7 +231,7 @@ class Walls:
         model, pairs, made = self.model, self.fluid.pairs, []
         for loop, term, store, out in (plain, *beside):
             Out = structure_of("PairSums", out)
-            own = store(model.precision, loop.Data, loop.Params, Out)
+            own = store(*loop.types, Out)
             made.append((term, own, loop.Data, Out))
         kernel = images.walled_kernel(
             *made, self.fluid.Params, model.precision, model.periodic, pairs.partners,

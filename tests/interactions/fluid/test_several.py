@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
+from cases.gradients import assert_gradient
 from cases.worlds import equal_alone, goes_on_after_reset_and_save
 
 SIZE = 0.1  # of the particles' lattice
@@ -91,19 +92,11 @@ def test_fields_are_interpolated_by_volumes():
 def test_forces_are_minus_the_gradient_of_the_energy(walls):
     """At rest, on both sides and in a corner, of walls too."""
     scene = layers(walls=walls)
-    x, step, sim = scene.position, 1e-6, simulation(scene)
+    x, sim = scene.position, simulation(scene)
     force, corner = sim.get("force"), int(np.argmin(scene.position.max(axis=1)))
     between = np.argsort(np.abs(x[:, 1] - 0.3))[:4]
     for i, axis in itertools.product([corner, *between], range(3)):
-        energy = []
-        for sign in (1, -1):
-            moved = x.copy()
-            moved[i, axis] += sign * step
-            sim.set("position", moved)
-            energy.append(sim.diagnostics().potential[0])
-        # Differences of the second order, about (step / h)^2, and of 1e-16 of the energy over it.
-        expected = -(energy[0] - energy[1]) / (2 * step)
-        assert force[i, axis] == pytest.approx(expected, abs=1e-6 * np.abs(force).max())
+        assert_gradient(sim, x, force, i, axis)
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ import pytest
 import warp as wp
 
 import particlesim as ps
+from cases.gradients import assert_gradient
 from cases.worlds import equal_alone, goes_on_after_reset_and_save
 from particlesim.engine.model import Model
 
@@ -59,20 +60,11 @@ def simulation(scene, precision="float64", device="cpu", **knobs):
 def test_forces_are_minus_the_gradient_of_the_energy(kind):
     """Beside flat walls and curved ones, in corners and in the middle."""
     scene = water(BOUNDARIES[kind](), shift=0.075)  # so that no wall gives way
-    x, step = scene.position, 1e-6
-    sim = simulation(scene)
+    x, sim = scene.position, simulation(scene)
     force = sim.get("force")
     near = np.argsort(x.max(axis=1))[:2]  # in the corner
     for i, axis in itertools.product([*near, 40, 100], range(3)):
-        energy = []
-        for sign in (1, -1):
-            moved = x.copy()
-            moved[i, axis] += sign * step
-            sim.set("position", moved)
-            energy.append(sim.diagnostics().potential[0])
-        # Differences of the second order, about (step / h)^2, and of 1e-16 of the energy over it.
-        expected = -(energy[0] - energy[1]) / (2 * step)
-        assert force[i, axis] == pytest.approx(expected, abs=1e-6 * np.abs(force).max())
+        assert_gradient(sim, x, force, i, axis)
 
 
 @pytest.mark.parametrize("slip", [True, False])

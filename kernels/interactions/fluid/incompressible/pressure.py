@@ -20,9 +20,7 @@ from ....precision import Precision, register
 
 BLOCK = 128  # slots that one thread sums
 LEAST, MOST = 0.05, 20.0  # of omega
-LEAST_ITERATIONS = (
-    2  # of a solve: pressures then follow what changes slowly below the tolerance, too
-)
+LEAST_ITERATIONS = 2  # pressures then follow what changes slowly below the tolerance, too
 
 
 @functools.cache

@@ -113,9 +113,8 @@ class Continuity:
     def over(self, loop: PairLoop, slope: wp.Function, laws: dict[str, wp.Function]) -> None:
         """Make the terms of a loop that reads these."""
         self.loop, self.slope = loop, slope
-        types = loop.model.precision, loop.Data, loop.Params
-        self.term = kernels.rate_term(slope, self.diffuses, *types)
-        self.gradient_term = kernels.gradient_term(slope, *types) if self.diffuses else None
+        self.term = kernels.rate_term(slope, self.diffuses, *loop.types)
+        self.gradient_term = kernels.gradient_term(slope, *loop.types) if self.diffuses else None
         self.keep_gradient = functools.partial(
             kernels.keep_gradient, laws["pressure"], laws["sound_speed"]
         )
@@ -132,8 +131,7 @@ class Continuity:
         inputs = [pairs.pairs, self.excess, self.time, self.since, fields["excess"], fields["lag"]]
         launch(kernels.gather_kernel(model.precision), pairs.count, inputs, model.device)
         if self.half is not None:
-            inputs = [pairs.order, self.half, fields["move"]]
-            launch(kernels.vectors_kernel(model.precision), pairs.count, inputs, model.device)
+            pairs.sort(self.half, fields["move"])
         if self.gradient_term is not None:
             gradients = {"gradient": fields["gradient"]}
             self.loop.sum(self.gradient_term, self.keep_gradient, gradients)
@@ -149,9 +147,8 @@ class Continuity:
         loop, rho = self.loop, wp.zeros_like(self.excess)
         self.pairs.update(self.fluid.state)
         self.pairs.grow()
-        types = loop.model.precision, loop.Data, loop.Params
         keep = functools.partial(kernels.keep_sum, weight)
-        loop.sum(of_sums.density_term(weight, *types), keep, {"rho": rho})
+        loop.sum(of_sums.density_term(weight, *loop.types), keep, {"rho": rho})
         return rho.numpy().astype(np.float64)
 
     def persistent(self) -> dict[str, wp.array]:

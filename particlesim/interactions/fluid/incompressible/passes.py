@@ -67,9 +67,6 @@ class PressurePasses:
         fluid = self.fluid
         return PairLoop.over(self.model, fluid.pairs, name, fields, fluid.Params, fluid.params)
 
-    def _types(self, loop: PairLoop) -> tuple[Any, ...]:
-        return self.model.precision, loop.Data, loop.Params
-
     def _seen(self, counts: bool) -> list[Seen]:
         """One wall, and several; fluids slip along them, where how they approach ``counts``."""
         total = self.walls.total
@@ -77,17 +74,17 @@ class PressurePasses:
         return [Seen(total, None if slips is None else slips[:1], True), Seen(total, slips)]
 
     def _steep(self, approaching: bool, loop: PairLoop) -> wp.Function:
-        return kernels.steepness(self.fluid.slope, approaching, *self._types(loop))
+        return kernels.steepness(self.fluid.slope, approaching, *loop.types)
 
     def _rates(self, fields: Mapping[str, wp.array], parting: wp.array) -> list[Pass]:
         loop, dimension = self._loop("Rates", fields), self.fluid.dimension
-        term = kernels.rate_term(self._steep(True, loop), dimension, *self._types(loop))
+        term = kernels.rate_term(self._steep(True, loop), dimension, *loop.types)
         out = {"rate": self.rate}
         found = [Pass(loop, term, kernels.keep_rate, out)]
         if self.walls:
             beside = {**fields, "wall": self.walls.distance, "rate": parting}
             loop = self._loop("RatesBesideWalls", beside)
-            steep, types = self._steep(True, loop), self._types(loop)
+            steep, types = self._steep(True, loop), loop.types
             for seen in self._seen(True):
                 term = kernels.walled_rate_term(steep, seen, dimension, *types)
                 own = kernels.own_rate(steep, seen, *types)
@@ -97,13 +94,13 @@ class PressurePasses:
 
     def _diagonals(self, fields: Mapping[str, wp.array]) -> list[Pass]:
         loop, dimension = self._loop("Diagonals", fields), self.fluid.dimension
-        term = kernels.diagonal_term(self._steep(False, loop), dimension, *self._types(loop))
+        term = kernels.diagonal_term(self._steep(False, loop), dimension, *loop.types)
         out = {"diagonal": self.diagonal}
         found = [Pass(loop, term, kernels.keep_diagonal, out)]
         if self.walls:
             out = {**out, "normal": self.normal}
             loop = self._loop("DiagonalsBesideWalls", {**fields, "wall": self.walls.distance})
-            steep, types = self._steep(False, loop), self._types(loop)
+            steep, types = self._steep(False, loop), loop.types
             for seen in self._seen(False):
                 term = kernels.walled_diagonal_term(steep, seen, dimension, *types)
                 own = images.own_push(steep, None, seen, *types)
@@ -113,14 +110,14 @@ class PressurePasses:
 
     def _accelerations(self, fields: Mapping[str, wp.array]) -> list[Pass]:
         loop, dimension = self._loop("Pressures", fields), self.fluid.dimension
-        pull = kernels.pressure_pull(self.fluid.slope, *self._types(loop))
-        term = force_term(pull, None, False, dimension, *self._types(loop))
+        pull = kernels.pressure_pull(self.fluid.slope, *loop.types)
+        term = force_term(pull, None, False, dimension, *loop.types)
         out = {"a": self.a, "w": self.fluid.state.inverse_mass}
         found = [Pass(loop, term, kernels.keep_acceleration, out)]
         if self.walls:
             out = {**out, "normal": self.normal, "parting": self.parting_faster}
             loop = self._loop("PressuresBesideWalls", {**fields, "wall": self.walls.distance})
-            types = self._types(loop)
+            types = loop.types
             pull = kernels.pressure_pull(self.fluid.slope, *types)
             for seen in self._seen(False):
                 term = images.force_term(pull, None, seen, DIRECTIONS[dimension], *types)
