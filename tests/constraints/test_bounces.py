@@ -108,7 +108,7 @@ def test_worlds_bounce_as_alone(device):
 
     def build(height):
         scene = ps.Scene()
-        scene.add_particles(CUBE + [0, height, 0], radius=0.05, velocity=(0.3, -3, 0))
+        scene.add_particles(CUBE + np.array([0, height, 0]), radius=0.05, velocity=(0.3, -3, 0))
         scene.add_constraint(ps.Distance(SHORT))
         floor = ps.PlaneBoundary((0, 0, 0), (0, 1, 0), restitution=0.8, friction=0.3)
         scene.add_constraint(floor)

@@ -13,7 +13,7 @@ EDGES = list(itertools.combinations(range(8), 2))
 
 def thrown(links):
     scene = ps.Scene()
-    scene.add_particles(BOX, velocity=np.cross([1.0, 2.0, 3.0], BOX - 0.5) + [5, 0, 0])
+    scene.add_particles(BOX, velocity=np.cross([1.0, 2.0, 3.0], BOX - 0.5) + np.array([5, 0, 0]))
     scene.add_constraint(links)
     return scene
 
