@@ -18,7 +18,6 @@ from ..kernels.constraints import boundary as kernels
 from ..kernels.constraints.boundaries.meeting import Form, held_type
 from ..kernels.constraints.rigid_motion import motion_type, pose_kernel, pose_type
 from ..kernels.precision import Precision
-from ..scene.part import Part
 from ..scene.wall import Wall
 from .easing import EasedConstraint
 from .tuples import bodies
@@ -139,7 +138,10 @@ class Holding(EasedConstraint):
         return self.model.unresolved_radii(self.name, self.members)
 
     def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
-        return self.worlds_held if name == "slack" else super().worlds(name, array)
+        return self.worlds_held if name in ("slack", "pressed") else super().worlds(name, array)
+
+    def readable(self) -> dict[str, wp.array]:
+        return {"pressed": self.held.pressed} if self.count else {}
 
     def _launch(self, kernel: wp.Kernel, *inputs: Any) -> None:
         everything = [self.params, self.held, self.bodies, *inputs]
@@ -164,13 +166,10 @@ class Holding(EasedConstraint):
         if self.count and self.bouncing and dt > 0:
             self._launch(self.bounce_kernel, self.force, dt, 1.0 / dt)
 
-    def read_force(self, part: Part) -> np.ndarray:
-        """What particles exert that touch it, -sum m dx / dt^2 of the last substep, (worlds, 3)."""
-        model, found = self.model, np.zeros((len(self.peers), 3))
-        if self.count:
-            mass = model.column("mass")[self.members]
-            way = self.held.pressed.numpy().astype(np.float64) * mass[:, None]
-            for axis in range(3):
-                sums = np.bincount(self.worlds_held, way[:, axis], len(found))
-                found[:, axis] = -sums / model.settings.substep**2
-        return found[[part is self or part is peer for peer in self.peers]]
+    def exerted(self) -> tuple[np.ndarray, np.ndarray]:
+        """What particles exert that touch it, -m dx / dt^2 of the last substep, by row, (k, 3)."""
+        if not self.count:
+            return self.members, np.zeros((0, 3))
+        mass = self.model.column("mass")[self.members]
+        way = self.held.pressed.numpy().astype(np.float64)
+        return self.members, -way * mass[:, None] / self.model.settings.substep**2
