@@ -48,6 +48,8 @@ def held_type(precision: Precision, sides: int) -> Any:
         "slack": wp.array(dtype=each),
         "marked": wp.array(dtype=wp.int32),  # worlds whose slack is to be measured
         "grip": wp.array(dtype=each),  # empty where nothing rubs
+        "rebound": wp.array(dtype=each),  # speeds to bounce off at, 0: not; empty like grip
+        "impulse": wp.array(dtype=each),  # that have sent them off so far, over their masses
         "pressed": wp.array(dtype=precision.vec3),  # how far it has moved them in a substep
         "pose": wp.array(dtype=pose_type(precision)),  # by world; empty where nothing moves
     }
@@ -72,21 +74,6 @@ def friction_function(precision: Precision) -> wp.Function:
         return t * factor
 
     return function(rub)
-
-
-@functools.cache
-def bounce_function(precision: Precision) -> wp.Function:
-    """``bounce(before, now, e)``: what takes a normal velocity to e times that before, away.
-
-    Mueller et al. (2020), eq. 34. ``before`` is that at the start of the substep, before its
-    forces: what rests under gravity does not bounce.
-    """
-    real = precision.scalar
-
-    def bounce(before: real, now: real, e: real):
-        return wp.where(before < real(0.0), wp.max(-e * before - now, real(0.0)), real(0.0))
-
-    return function(bounce)
 
 
 @functools.cache
@@ -237,46 +224,3 @@ def project_kernel(form: Form) -> wp.Kernel:
             h.pressed[k] = h.pressed[k] + dx
 
     return project_boundary
-
-
-@functools.cache
-def bounce_kernel(form: Form, forces: bool) -> wp.Kernel:
-    """Kernel: normal velocities against the surface become what restitution makes of them."""
-    sides, precision, params = form.sides, form.precision, form.params
-    vec3, real = precision.vec3, precision.scalar
-    Bodies, Held = bodies_type(precision), held_type(precision, sides)
-    kept, rebound = rounding_function(precision, form.compensated), bounce_function(precision)
-    meet, velocity_of = meeting_function(form), velocity_function(form)
-
-    @register
-    def bounce_boundary(
-        first: int,
-        parameters: wp.array(dtype=params),
-        h: Held,
-        b: Bodies,
-        f: wp.array(dtype=vec3),
-        dt: real,
-        inverse_dt: real,
-    ):
-        k = first + wp.tid()
-        i = h.particle[k]
-        w = h.world[k]
-        p = parameters[w]
-        if p.restitution > real(0.0) and b.w[i] > real(0.0):
-            x = b.x[i]
-            c = b.correction[i]
-            back, N = meet(i, w, x, kept(i, b) - c, h.slack[k], p, h)
-            if wp.max(back) > real(0.0):
-                v = velocity_of(x, b.v[i], w, h)
-                before = v - c * inverse_dt
-                if wp.static(forces):
-                    before = before - f[i] * (b.w[i] * dt)
-                dv = vec3()
-                for a in range(wp.static(sides)):
-                    if back[a] > real(0.0):
-                        n = N[a]
-                        now = wp.dot(v + dv, n)
-                        dv = dv + n * rebound(wp.dot(before, n), now, p.restitution)
-                b.v[i] = b.v[i] + dv
-
-    return bounce_boundary

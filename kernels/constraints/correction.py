@@ -7,70 +7,128 @@ import warp as wp
 from ..precision import function
 from .constraints import Solved, positions_type, seen_function
 
+TURNED = 0.5  # of the gradient: what is left of it along that at the start of the substep
+SHIFTED = 0.5  # parts of a tuple's extent that it may shift its particles by, in a substep
+
 
 @functools.cache
 def evaluate_function(law: Solved) -> wp.Function:
-    """``evaluate(x, e, q, B) -> (C, G)``: what a law makes of what it sees of a tuple."""
-    positions, Box, item = positions_type(law.precision, law.size), law.types[1], law.item
-    law_of, seen = law.evaluate, seen_function(law)
+    """``evaluate(x, e, c, v, q, B, dt) -> (C, G, H, extent)``: what a law makes of a tuple.
 
-    def evaluate_seen(x: positions, e: positions, q: item, B: Box):
-        C, G = law_of(seen(x, e, B), q)
-        return C, G
+    C and its gradient where the particles are, the gradient where the substep began, and how far
+    the particles were apart there. The way of the substep is v dt plus the corrections so far,
+    which does not cancel. A projection outside of time (dt = 0) begins where it is.
+    """
+    positions, Box, item = positions_type(law.precision, law.size), law.types[1], law.item
+    law_of, seen, real = law.evaluate, seen_function(law), law.precision.scalar
+    size, relative = law.size, law.relative
+
+    def evaluate_seen(
+        x: positions, e: positions, c: positions, v: positions, q: item, B: Box, dt: real
+    ):
+        X = seen(x, e, B)
+        C, G = law_of(X, q)
+        H = G
+        extent = real(0.0)
+        if wp.static(size > 1):
+            began = wp.where(dt > real(0.0), real(1.0), real(0.0))
+            Y = X
+            for a in range(wp.static(size)):
+                Y[a] = X[a] - (v[a] * dt + c[a]) * began
+            if wp.static(relative):
+                first = Y[0]
+                for a in range(wp.static(size)):
+                    Y[a] = Y[a] - first
+            _C, H = law_of(Y, q)
+            for a in range(1, wp.static(size)):
+                extent += wp.length_sq(Y[a] - Y[0])
+            extent = wp.sqrt(extent)
+        return C, G, H, extent
 
     # Emitted behind the evaluation, which may itself stand behind the adjoints that it calls.
     return function(evaluate_seen, after_gradients=True)
 
 
+def _sums_function(law: Solved) -> wp.Function:
+    """``sums(G, H, w) -> (s, turned, began, reach, total)``: what all particles of a tuple add to.
+
+    s, turned and began are w G . G, w G . H and w H . H; reach w |G|; total w.
+    """
+    real, size, unit = law.precision.scalar, law.size, law.unit
+    positions, weights = positions_type(law.precision, law.size), law.precision.vector(law.size)
+
+    def sums(G: positions, H: positions, w: weights):
+        s = real(0.0)
+        turned = real(0.0)
+        began = real(0.0)
+        reach = real(0.0)
+        total = real(0.0)
+        for a in range(wp.static(size)):
+            total += w[a]
+            turned += w[a] * wp.dot(G[a], H[a])
+            if wp.static(not unit):
+                s += w[a] * wp.length_sq(G[a])
+                began += w[a] * wp.length_sq(H[a])
+                reach += w[a] * wp.length(G[a])
+        if wp.static(unit):
+            return total, turned, total, total, total
+        else:
+            return s, turned, began, reach, total
+
+    return function(sums)
+
+
 @functools.cache
 def multiply_function(law: Solved) -> wp.Function:
-    """``multiply(...) -> (lam, good, s)``: a tuple's multiplier after one step, whether it makes
-    sense, and how far along grad_a C each particle goes (Macklin et al. 2016, eqs. 17, 18 and 26).
+    """``multiply(...) -> (lam, good, dx)``: a tuple's multiplier after one step, whether it makes
+    sense, and how far each particle goes.
 
-    dlam = (-C - alpha~ lam - gamma grad C . (x - x_prev)) / ((1 + gamma) sum w |grad C|^2 + alpha~)
-    with alpha~ = alpha / dt^2 and gamma = alpha beta / dt; then dx_a = w_a grad_a C dlam. The way
-    of this substep, x - x_prev, is v dt plus the corrections so far, which does not cancel.
+        dlam = (-C - alpha~ lam) / (sum w grad C . D + alpha~),  dx_a = w_a D_a dlam
+
+    with alpha~ = alpha / dt^2 (Macklin et al. 2016, eqs. 17 and 18) and D the gradient H at the
+    start of the substep (Ryckaert, Ciccotti and Berendsen 1977, eq. 4.8): the impulses D dlam / dt
+    act where the particles were, so that the angular momentum sum m x_new x (x_new - x_old) / dt =
+    sum m x_old x v is kept exactly. Where the tuple has turned too far for that, or pulls so hard
+    that a substep does not resolve how it swings (it shifts its particles by more than a part of
+    its extent), D is the gradient G where they are now, which is stable at any step.
 
     It chooses among numbers and does not branch, so that many tuples can be taken at once.
     """
     real = law.precision.scalar
     positions, weights = positions_type(law.precision, law.size), law.precision.vector(law.size)
-    size, unit, item = law.size, law.unit, law.item
-    damped, one_sided = law.damped, law.one_sided
+    size, item, one_sided, sums = law.size, law.item, law.one_sided, _sums_function(law)
 
     def multiply(
-        C: real, G: positions, c: positions, v: positions, w: weights, lam: real, q: item,
-        mass: real, most: real, dt: real, inverse_dt: real,
+        C: real, G: positions, H: positions, extent: real, w: weights, lam: real, q: item,
+        mass: real, most: real, inverse_dt: real,
     ):  # fmt: skip
-        s = real(0.0)
-        total = real(0.0)
         for a in range(wp.static(size)):
             w[a] = w[a] * mass
-            total += w[a]
-            if wp.static(unit):
-                s += w[a]
-            else:
-                s += w[a] * wp.length_sq(G[a])
+        s, turned, began, reach, total = sums(G, H, w)
         alpha = q.compliance * inverse_dt * mass * inverse_dt  # in an order that stays in range
-        new = real(0.0)
-        if wp.static(damped):
-            gamma = q.compliance * q.damping * inverse_dt
-            way = real(0.0)
-            for a in range(wp.static(size)):
-                way += wp.dot(G[a], v[a] * dt + c[a])
-            # A world that is not damped goes as it goes alone.
-            way = wp.where(gamma > real(0.0), gamma * way, real(0.0))
-            new = lam + (-C - alpha * lam - way) / ((real(1.0) + gamma) * s + alpha)
-        else:
-            new = lam + (-C - alpha * lam) / (s + alpha)
+        missing = -C - alpha * lam
+        shift = reach * wp.abs(lam + missing / (s + alpha))
+        straight = wp.where(
+            turned >= real(TURNED) * s,
+            wp.where(began * real(TURNED) <= s, shift <= real(SHIFTED) * extent, False),
+            False,
+        )
+        if wp.static(size > 1):
+            s = wp.where(straight, turned, s)
+        new = lam + missing / (s + alpha)
         if wp.static(one_sided):
             new = wp.max(new, real(0.0))
             new = wp.where(C >= real(0.0), wp.where(lam == real(0.0), real(0.0), new), new)
         d_lam = new - lam
         # All pinned, or no gradient (a comparison with NaN is false): nothing sensible to do.
         good = wp.where(s > real(0.0), wp.abs(d_lam) * total < most, False)
+        dx = G
         for a in range(wp.static(size)):
-            w[a] = w[a] * d_lam
-        return new, good, w
+            for k in range(3):
+                along = G[a, k]
+                if wp.static(size > 1):
+                    along = wp.where(straight, H[a, k], G[a, k])
+                dx[a, k] = along * (w[a] * d_lam)
+        return new, good, dx
 
     return function(multiply)

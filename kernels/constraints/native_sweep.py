@@ -31,7 +31,7 @@ def native_sweep(law: Solved) -> wp.Function:
     shift = shift_function(law.precision, law.compensated)
     positions, weights = positions_type(law.precision, size), law.precision.vector(size)
     moved = {"x": "x", "c": "correction"} | ({"e": "x_error"} if law.compensated else {})
-    read = moved | ({"v": "v"} if law.damped else {})
+    read = moved | {"v": "v"}
 
     def rows(move: str, fields: dict[str, str]) -> str:
         """Rows of all particles number ``a``, from or to planes."""
@@ -52,8 +52,8 @@ def native_sweep(law: Solved) -> wp.Function:
     const int lanes = {lane_count(law.precision)}, tuples = {group(law)};
     typedef __typeof__(*t.item.data) Item;
     const {c}* inverse_mass = {elements("b.w", c)};
-    alignas(64) {c} {", ".join(f"{name}_of[{size}][3][tuples]" for name in [*read, "G"])};
-    alignas(64) {c} w_of[{size}][tuples], lam_of[tuples], C_of[tuples];
+    alignas(64) {c} {", ".join(f"{name}_of[{size}][3][tuples]" for name in [*read, "G", "H"])};
+    alignas(64) {c} w_of[{size}][tuples], lam_of[tuples], C_of[tuples], extent_of[tuples];
     for (int r = first; r < last; r += tuples) {{
         {pointers}
         for (int a = 0; a < {size}; ++a) {{
@@ -73,8 +73,8 @@ def native_sweep(law: Solved) -> wp.Function:
     ):  # fmt: skip
         p = positions()
         q = t.item[first]
-        evaluate(p, p, q, Box())
-        multiply(dt, p, p, p, weights(), dt, q, dt, dt, dt, dt)
+        evaluate(p, p, p, p, q, Box(), dt)
+        multiply(dt, p, p, dt, weights(), dt, q, dt, dt, dt)
         shift(vec3(), vec3(), vec3(), vec3())
 
     return native(sweep_natively, snippet)
@@ -97,12 +97,12 @@ def _lane_loops(law: Solved, moved: Iterable[str], read: Iterable[str]) -> str:
     # them at once: a loop that leaves some out could not take its last lanes together.
     fields = [(f"q_of[{n}][l]", each) for n, each in enumerate(numbers(law.item))]
     item = [(f"q.{each}", place) for place, each in fields]
-    seen = [*planes(n for n in read if n in "xe"), *item]
+    seen = [*planes(read), *item]
     if law.periodic:
         box = numbers(box_type(law.precision))
         seen += [(f"B.{each}", f"box.data[world[l]].{each}") for each in box]
     known = [
-        *planes(n for n in [*read, "G"] if n in "cvG"),
+        *planes("GH"),
         *item,
         *((f"w[{a}]", f"w_of[{a}][l]") for a in range(size)),
     ]
@@ -113,24 +113,24 @@ def _lane_loops(law: Solved, moved: Iterable[str], read: Iterable[str]) -> str:
         for (int l = 0; l < tuples; ++l) {{ {_copied((to, f"item[l].{of}") for to, of in fields)} }}
 #pragma clang loop interleave_count(2)
         for (int l = 0; l < tuples; ++l) {{
-            {matrix(size, 3, c)} x, e, G;
+            {matrix(size, 3, c)} x, e, c, v, G, H;
             Item q;
             __typeof__(*box.data) B;
             {_copied(seen)}
-            {evaluate}(x, e, q, B, C_of[l], G);
-            {_copied((of, to) for to, of in planes("G"))}
+            {evaluate}(x, e, c, v, q, B, dt, C_of[l], G, H, extent_of[l]);
+            {_copied((of, to) for to, of in planes("GH"))}
         }}
 #pragma clang loop interleave_count(2)
         for (int l = 0; l < tuples; ++l) {{
-            {matrix(size, 3, c)} G, c, v;
-            {vector(size, c)} w, s;
+            {matrix(size, 3, c)} G, H, D;
+            {vector(size, c)} w;
             Item q;
             const {c} lam_old = fresh ? 0 : lam[l];
             {c} lam_new;
             bool good;
             {_copied(known)}
-            {multiply}(C_of[l], G, c, v, w, lam_old, q, b.unit, b.most, dt, inverse_dt,
-                lam_new, good, s);
+            {multiply}(C_of[l], G, H, extent_of[l], w, lam_old, q, b.unit, b.most, inverse_dt,
+                lam_new, good, D);
             lam_of[l] = good ? lam_new : lam_old;
             {" ".join(_moved(law, moved, a) for a in range(size))}
         }}
@@ -144,7 +144,7 @@ def _moved(law: Solved, names: Iterable[str], a: int) -> str:
     return f"""{{
             {vector(3, law.precision.c)} x, e, c, dx, x_new, e_new, c_new;
             {_copied((f"{n}[{k}]", place) for n, k, place in places)}
-            {_copied((f"dx[{k}]", f"{entry('G', a, k)} * s[{a}]") for k in range(3))}
+            {_copied((f"dx[{k}]", entry("D", a, k)) for k in range(3))}
             {shift}(x, e, c, dx, x_new, e_new, c_new);
             {_copied((place, f"good ? {n}_new[{k}] : {n}[{k}]") for n, k, place in places)}
             }}"""

@@ -28,7 +28,7 @@ def plain_sweep(law: Solved) -> wp.Function:
     positions, weights = positions_type(law.precision, law.size), law.precision.vector(law.size)
     place = place_function(law.precision, law.compensated)
     wraps, compensated = bool(law.periodic), law.compensated
-    damped, breakable = law.damped, law.breakable
+    breakable = law.breakable
 
     def sweep_plainly(
         first: int, last: int, fresh: int, box: wp.array(dtype=Box), t: Tuples, b: Bodies,
@@ -52,18 +52,17 @@ def plain_sweep(law: Solved) -> wp.Function:
                 w[a] = b.w[ids[a]]
                 if wp.static(compensated):
                     e[a] = b.x_error[ids[a]]
-                if wp.static(damped):
-                    c[a] = b.correction[ids[a]]
-                    v[a] = b.v[ids[a]]
+                c[a] = b.correction[ids[a]]
+                v[a] = b.v[ids[a]]
             B = Box()
             if wp.static(wraps):
                 B = box[t.world[r]]
-            C, G = evaluate(x, e, q, B)
-            lam, good, s = multiply(C, G, c, v, w, t.lam[r], q, b.unit, b.most, dt, inverse_dt)
+            C, G, H, extent = evaluate(x, e, c, v, q, B, dt)
+            lam, good, dx = multiply(C, G, H, extent, w, t.lam[r], q, b.unit, b.most, inverse_dt)
             if good:
                 t.lam[r] = lam
                 for a in range(wp.static(size)):
-                    place(ids[a], x[a], e[a], G[a] * s[a], b)
+                    place(ids[a], x[a], e[a], dx[a], b)
 
     return function(sweep_plainly, after_gradients=True)
 

@@ -20,28 +20,31 @@ from ..engine.state import State
 from ..kernels.constraints import constraints as kernels
 from ..kernels.constraints.constraint_force import virial_kernel
 from ..kernels.constraints.projection import BLOCK, project_kernel
-from ..scene.constraint_base import ConstraintBase
 from ..scene.law import law as make_law
-from ..scene.part import Part
 from .force import ConstraintForce
 from .limits import constraint_limits
+from .reading import ReadTuples
 from .tuples import Tuples, bodies
+from .velocities import TupleVelocities
 
 OWN = ("compliance", "damping", "break_force")  # parameters of every constraint
 
 
-class Constraint(ConstraintBase):
+class Constraint(ReadTuples):
     r"""C(x) = 0, or C(x) >= 0, on tuples of particles: XPBD with a gradient derived from C.
 
     In each iteration a tuple's multiplier lam, zero at the start of a substep, grows by
 
-        dlam = (-C - alpha~ lam - gamma grad C . (x - x_prev))
-               / ((1 + gamma) sum w |grad C|^2 + alpha~)
+        dlam = (-C - alpha~ lam) / (sum w grad C . D + alpha~),  alpha~ = alpha / dt^2
 
-    with alpha~ = alpha / dt^2 and gamma = alpha beta / dt, and its particles move by
-    w_a grad_a C dlam (Macklin, Mueller and Chentanez 2016, eqs. 17, 18 and 26). Tuples are solved
-    one after the other (Gauss-Seidel), those that share no particle at once. The result is that
-    of a spring of stiffness 1/alpha with a damper beta, however many iterations are made.
+    and its particles move by w_a D_a dlam (Macklin, Mueller and Chentanez 2016, eqs. 17 and 18). D
+    is the gradient where the substep began (Ryckaert, Ciccotti and Berendsen 1977), which keeps
+    angular momentum exactly; where that has turned too far, or pulls so hard that a substep does
+    not resolve how the tuple swings, that where the particles are, which is stable at any step.
+    Damping follows as an impulse on the velocities, implicit in them, so that what rests does not
+    know of it. Tuples are solved one after the other (Gauss-Seidel), those that share no particle
+    at once. The result is that of a spring of stiffness 1/alpha with a damper beta, however many
+    iterations are made.
 
     Write C as a length or an angle rather than a square of it: a step follows the tangent of C,
     and is as good as the tangent. Tuples whose gradient vanishes, and those with all particles
@@ -53,8 +56,8 @@ class Constraint(ConstraintBase):
             row must be within half a box), the others are given by keyword.
         particles: (m, k) indices, distinct within a row; (m,) for k = 1.
         compliance: alpha, the inverse of the stiffness [C / force], one or (m,), at least 0.
-        damping: beta, force on C for its rate [force time / C], one or (m,), at least 0. Acts
-            through the compliance: a rigid constraint has nothing to damp.
+        damping: beta, force on C for its rate [force time / C], one or (m,), at least 0. A rigid
+            constraint has nothing to damp.
         inequality: Hold C >= 0 only: acts while C < 0, and only pushes C up.
         break_force: Force on an end beyond which a tuple is gone for good [force], one or (m,),
             above 0; None: unbreakable.
@@ -192,6 +195,8 @@ class Constraint(ConstraintBase):
             once = alpha / dt
             model.fits(self.name, {"compliance/dt": once})
             model.fits(self.name, {"compliance/dt^2": once * model.mass_unit / dt})
+            beta = np.concatenate([peer.damping for peer in self.peers])
+            model.fits(self.name, {"damping dt": beta * dt / model.mass_unit})
 
     def attach(self, model: Model, state: State) -> None:
         if not self.count:
@@ -203,6 +208,7 @@ class Constraint(ConstraintBase):
         solved = self.tuples.solved(self, state)
         self.project_kernel = project_kernel(solved, model.vectorised)
         self.block = BLOCK if model.vectorised else 1
+        self.velocities = TupleVelocities(self, solved)
         self.strain_kernel = kernels.strain_kernel(solved)
         self.virial_kernel = virial_kernel(solved)
 
@@ -221,7 +227,17 @@ class Constraint(ConstraintBase):
             inputs = [start, end, scale, self.model.box, self.struct, self.bodies, own, 1.0 / dt]
             launch(self.project_kernel, end - start, inputs, self.model.device, self.block)
 
+    def start_bounce(self, state: State, neighbors: Neighbors, bounces: Any, dt: float) -> None:
+        if self.count:
+            self.velocities.start_bounce()
+
+    def bounce(self, state: State, neighbors: Neighbors, bounces: Any, dt: float) -> None:
+        if self.count:
+            self.velocities.bounce(bounces, dt)
+
     def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        if self.count and dt > 0:
+            self.velocities.damp(dt)
         if self.count and self.break_force is not None:
             self._strain(may_break=True)
 
@@ -259,38 +275,3 @@ class Constraint(ConstraintBase):
 
     def reset(self, worlds: Sequence[int]) -> None:
         self.forget({**self.persistent(), **self.readable()}, worlds)
-
-    # Reading ------------------------------------------------------------------------------------
-
-    def read_force(self, part: Part) -> np.ndarray:
-        if not self.count:
-            return np.zeros(0)
-        self._strain(may_break=False)
-        return self._listed(self.strain.numpy(), part)
-
-    def read_broken(self, part: Part) -> np.ndarray:
-        if self.count and self.break_force is not None:
-            return self._listed(self.struct.broken.numpy(), part) > 0
-        return self._listed(np.zeros(self.count), part) > 0
-
-    def _listed(self, rows: np.ndarray, part: Part) -> np.ndarray:
-        """Values of the sorted rows, of the worlds of ``part``, in the order of its tuples."""
-        values = np.empty_like(rows)
-        values[self.tuples.order] = rows
-        edges = self.tuples.edges
-        mine = [w for w, peer in enumerate(self.peers) if part is self or part is peer]
-        return np.concatenate([values[edges[w] : edges[w + 1]] for w in mine])
-
-    @property
-    def force(self) -> np.ndarray:
-        """See ``Simulation.force``; only of ``sim.constraints``: a scene's may be in several."""
-        if "peers" not in self.__dict__:
-            raise self._elsewhere("force")
-        return self.read_force(self)
-
-    @property
-    def broken(self) -> np.ndarray:
-        """See ``Simulation.broken``; only of ``sim.constraints``, like :attr:`force`."""
-        if "peers" not in self.__dict__:
-            raise self._elsewhere("broken")
-        return self.read_broken(self)

@@ -66,6 +66,7 @@ class Contact(EasedConstraint):
     """
 
     requires = frozenset({"position", "velocity", "inverse_mass", "radius", "correction"})
+    rank = 1
 
     def __init__(
         self, group: Any = None, friction: float = 0.0, restitution: float = 0.0, *,
@@ -156,7 +157,7 @@ class Contact(EasedConstraint):
         if self.rough:
             self.shares.grip = self.bounce_shares.grip = self.copies["grip"]
         self.everywhere = self._params(np.ones_like(rough))
-        self.bounces = self._params(bouncing)
+        self.bounce_params = self._params(bouncing)
         # A world is solved by the kernel that it would be solved by alone. First come the passes of
         # the first sweep, then those of all others, from which compliant contacts are left out.
         self.passes = [
@@ -262,8 +263,8 @@ class Contact(EasedConstraint):
              1.0 / dt, data],
             model.device,
         )  # fmt: skip
-        self._sum(self.count_bounces, self.bounces[1], data, self.bounce_shares)
-        self._sum(self.bounce_kernel, self.bounces[1], data, self.bodies)
+        self._sum(self.count_bounces, self.bounce_params[1], data, self.bounce_shares)
+        self._sum(self.bounce_kernel, self.bounce_params[1], data, self.bodies)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         """Add the virial of the last substep's contacts."""

@@ -15,6 +15,7 @@ from ..engine.model import Model
 from ..engine.neighbors.lists import Neighbors
 from ..engine.state import State
 from ..kernels.constraints import boundary as kernels
+from ..kernels.constraints.boundary_bounce import bounce_kernel, start_bounce_kernel
 from ..kernels.constraints.rigid_motion import motion_type, pose_kernel, pose_type
 from ..kernels.precision import Precision
 from ..scene.part import Part
@@ -27,6 +28,7 @@ class Holding(EasedConstraint):
     """Base of :class:`~particlesim.constraints.boundary.Boundary`, which describes what holds."""
 
     requires = frozenset({"position", "velocity", "inverse_mass", "radius", "correction"})
+    rank = 2
     solid = True
     sides = 1  # at most how many of them a particle touches at once
     slip: bool
@@ -98,7 +100,11 @@ class Holding(EasedConstraint):
         )  # fmt: skip
         self.begin_kernel = kernels.begin_kernel(self.form)
         self.project_kernel = kernels.project_kernel(self.form)
-        self.bounce_kernel = kernels.bounce_kernel(self.form, forces)
+        if self.bouncing:
+            self.held.rebound = wp.zeros(self.count, dtype=each, device=device)
+            self.held.impulse = wp.zeros(self.count, dtype=each, device=device)
+            self.start_bounce_kernel = start_bounce_kernel(self.form, forces)
+            self.bounce_kernel = bounce_kernel(self.form)
 
     def _posed(self, model: Model, state: State) -> tuple[wp.array, Callable[[], None]]:
         """Where it is, one a world, and what brings that to the present; empty where it stays."""
@@ -147,9 +153,17 @@ class Holding(EasedConstraint):
             timed = dt < math.inf
             self._launch(self.project_kernel, float(timed), dt if timed else 0.0)
 
-    def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        if self.count and self.bouncing and dt > 0:
-            self._launch(self.bounce_kernel, self.force, dt, 1.0 / dt)
+    @property
+    def bounces(self) -> bool:
+        return bool(self.count) and bool(self.bouncing)
+
+    def start_bounce(self, state: State, neighbors: Neighbors, bounces: Any, dt: float) -> None:
+        if self.bounces:
+            self._launch(self.start_bounce_kernel, self.force, bounces, dt, 1.0 / dt)
+
+    def bounce(self, state: State, neighbors: Neighbors, bounces: Any, dt: float) -> None:
+        if self.bounces:
+            self._launch(self.bounce_kernel, bounces, dt, 1.0 / dt)
 
     def read_force(self, part: Part) -> np.ndarray:
         """What particles exert that touch it, -sum m dx / dt^2 of the last substep, (worlds, 3)."""

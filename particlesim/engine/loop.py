@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -13,13 +12,14 @@ import warp as wp
 from .. import validate
 from ..scene.constraint_base import ConstraintBase
 from ..scene.fingerprint import laws_of
-from ..scene.part import Interaction, Part
+from ..scene.part import Interaction, Part, names_velocity
 from ..scene.scene import Scene
 from ..scene.settings import Settings
 from ..scene.thermostat import Barostat, Thermostat
 from .execution.acting import act
 from .execution.launch import owner
 from .integrators import Integrator, method
+from .integrators.bounces import Bounces
 from .limit import Limit, Pacing
 from .model import Model
 from .neighbors.lists import Neighbors
@@ -65,7 +65,7 @@ class Loop:
         moves = method(settings)
         for part in self.interactions:
             if part.reads_velocity is None:
-                part.reads_velocity = _names_velocity(type(part))
+                part.reads_velocity = names_velocity(type(part))
         self._check_takes(moves)
         self.implicit = [part for part in self.interactions if part.implicit]
         still = Interaction.advance
@@ -82,6 +82,8 @@ class Loop:
         for part in self.parts:
             part.attach(model, self.state)
         self.passes = in_turn(fuse(self.interactions))
+        self.swept = sorted(self.constraints, key=lambda each: each.rank)
+        self.bounces = Bounces(model, self.state, self.swept)
         self.observers = Observers()
         # Worlds that are not as the last evaluation of the forces, or the substep after it, left
         # them.
@@ -104,7 +106,8 @@ class Loop:
         self.constrain(dt, self.settings.iterations)
         act(self.integrator, self.integrator.finish, dt)
         now = self.state, self.neighbors, dt
-        for constraint in self.constraints:
+        self.bounces.act(self.observers, *now)
+        for constraint in self.swept:
             self.observers.act(constraint, FINISH, constraint.finish, *now)
         self.observers.end(dt)
 
@@ -142,17 +145,21 @@ class Loop:
         self.integrator.settle(dt)
 
     def constrain(self, dt: float, iterations: int) -> None:
-        """Constraints project the positions, one after the other, in each iteration."""
-        if not self.constraints:
+        """Constraints project the positions, one after the other, in each iteration.
+
+        However they were added, what holds bodies together comes first, then what keeps them apart,
+        then boundaries: friction is to see what all others have done.
+        """
+        if not self.swept:
             return
         with owner("pair lists"):
             self.neighbors.update_for_constraints(self.state)
         now = self.state, self.neighbors, dt
-        for constraint in self.constraints:
+        for constraint in self.swept:
             with owner(constraint.name):
                 act(constraint, constraint.begin, *now)
         for _ in range(iterations):
-            for constraint in self.constraints:
+            for constraint in self.swept:
                 self.observers.act(constraint, PROJECT, constraint.project, *now)
 
     def _check_takes(self, moves: type[Integrator]) -> None:
@@ -286,11 +293,3 @@ def in_turn(parts: Sequence[Interaction]) -> list[Interaction]:
 def _bound(parts: Sequence[Sequence[Any]]) -> list[Any]:
     """One part for all worlds, from the corresponding ones of the scenes."""
     return [peers[0].bind(peers) for peers in zip(*parts, strict=True)]
-
-
-def _names_velocity(kind: type) -> bool:
-    """Whether the source of a class speaks of velocities; of one that has none, it may."""
-    try:
-        return "velocity" in inspect.getsource(kind)
-    except (OSError, TypeError):
-        return True

@@ -14,9 +14,10 @@ class ConstraintBase(Part):
     """Acts on positions after integration.
 
     In a substep: ``begin`` once, then ``project`` in each iteration, in turn with the other
-    constraints, then, when the velocities have followed the projection, ``finish``. Corrections
-    are added to ``state.position`` and, the same amount, to ``state.correction``. What these
-    methods may do is what ``apply`` of an :class:`Interaction` may.
+    constraints, by ``rank``; then the velocities follow the projection, what has met something
+    bounces off, and ``finish``. Corrections are added to ``state.position`` and, the same amount,
+    to ``state.correction``. What these methods may do is what ``apply`` of an :class:`Interaction`
+    may.
 
     Example:
         >>> import warp as wp
@@ -47,6 +48,7 @@ class ConstraintBase(Part):
         ([[3.0, 0.5, 0.0]], [[3.0, 0.0, 0.0]])
     """
 
+    rank = 0  # of what is swept first: 0 holds bodies together, 1 apart, 2 within boundaries
     solid = False  # it is what holds a continuum, and has ``wall``
 
     def wall(self, model: Any, state: Any) -> Any:
@@ -61,7 +63,27 @@ class ConstraintBase(Part):
         raise validate.undefined(self, "project(self, state, neighbors, dt)")
 
     def finish(self, state: Any, neighbors: Any, dt: float) -> None:
-        """After the velocities have followed: restitution, breaking."""
+        """After the velocities have followed and what met has bounced off: damping, breaking."""
+
+    @property
+    def bounces(self) -> bool:
+        """Whether what it holds may bounce off; asked for once, when all parts are attached."""
+        return False
+
+    def start_bounce(self, state: Any, neighbors: Any, bounces: Any, dt: float) -> None:
+        """The velocities have followed: who bounces off, at what speed?
+
+        ``bounces`` is a struct (``kernels.engine.bounces``): velocities ``before`` the sweeps, and
+        worlds to be swept ``again``, which whoever is too slow marks. What a projection has made of
+        the velocity of who bounces off is taken back: the sweeps give the whole impulse.
+        """
+
+    def bounce(self, state: Any, neighbors: Any, bounces: Any, dt: float) -> None:
+        """One sweep over the velocities of worlds that are ``running``, by impulses alone.
+
+        What holds a body together takes care that the change of its velocities since ``before``
+        leaves it as it is.
+        """
 
     def measure(self, state: Any, energy: Any, virial: Any) -> None:
         """Add the virial of each particle (float64) in the last substep, on demand."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -234,3 +235,11 @@ class Interaction(Part):
             name: np.array(row, np.int32 if isinstance(row[0], np.integer) else np.float64)
             for name, row in rows.items()
         }
+
+
+def names_velocity(kind: type) -> bool:
+    """Whether the source of a class speaks of velocities; of one that has none, it may."""
+    try:
+        return "velocity" in inspect.getsource(kind)
+    except (OSError, TypeError):
+        return True

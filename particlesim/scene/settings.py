@@ -39,6 +39,8 @@ class Settings:
             run that wants more warns of what does. None: with ``"adaptive"`` 10 000.
         iterations: Sweeps over the constraints a substep (XPBD). Compliant constraints do not
             depend on it; stiff ones come closer to C = 0.
+        bounce_iterations: Sweeps over velocities in a substep in which something bounces off, at
+            most; a rigid body of many particles takes some tens of them (see ``Contact``).
         integrator: ``"symplectic_euler"`` (first order, any scene); ``"velocity_verlet"`` (second
             order, scenes without constraints); ``"yoshida4"`` and ``"yoshida6"`` (fourth and sixth
             order, 3 and 7 evaluations of the forces a substep, with forces of positions alone); or
@@ -91,6 +93,7 @@ class Settings:
     substeps: int | Any = 10  # or AUTO or ADAPTIVE
     most_substeps: int | None = None
     iterations: int = 1
+    bounce_iterations: int = 200
     integrator: str | type = "symplectic_euler"
     precision: str = "float32"
     skin: float | None = None
@@ -120,10 +123,10 @@ class Settings:
             "safety": None
             if self.safety is None
             else validate.number(owner, "safety", self.safety, above=0.0, maximum=1.0),
-            "iterations": validate.whole(owner, "iterations", self.iterations, minimum=1),
-            "pressure_iterations": validate.whole(
-                owner, "pressure_iterations", self.pressure_iterations, minimum=1
-            ),
+            **{
+                name: validate.whole(owner, name, getattr(self, name), minimum=1)
+                for name in ("iterations", "bounce_iterations", "pressure_iterations")
+            },
             **{
                 name: validate.number(owner, name, getattr(self, name), above=0.0)
                 for name in ("density_tolerance", "divergence_tolerance")

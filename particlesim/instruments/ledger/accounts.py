@@ -38,7 +38,7 @@ from ...engine.execution.copies import copy, zero
 from ...engine.execution.launch import launch, owner
 from ...engine.loop import Loop
 from ...engine.model import Model, filled
-from ...engine.observers import EXCHANGE, FOLLOW, FORCE, PROJECT, Observer
+from ...engine.observers import FOLLOW, FORCE, PROJECT, Observer
 from ...engine.state import State
 from ...kernels.instruments.ledger import TOTALS, account_kernel, change_kernel, ledger_type
 
@@ -102,6 +102,7 @@ class Accounts(Observer):
                     self._copy(each.late, each.early)
                 elif not each.acts:
                     zero(self.model, each.early)
+                    zero(self.model, each.late)
 
     def before(self, part: Any, stage: str) -> None:
         with owner("ledger"):
@@ -111,7 +112,7 @@ class Accounts(Observer):
         mine = next(each for each in self.accounts if each.part is part)
         change = mine.early if stage == PROJECT else mine.late
         with owner("ledger"):
-            more = int(stage in (FOLLOW, PROJECT, EXCHANGE))
+            more = int(stage != FORCE)
             inputs = [self._changing(stage), self.seen, more, change]
             launch(change_kernel(self.model.precision), len(change), inputs, self.model.device)
 
