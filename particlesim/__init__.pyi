@@ -14,6 +14,7 @@ from .constraints.constraint import Constraint
 from .constraints.contact import Contact
 from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
+from .constraints.scene import Scene
 from .engine.execution.launch import launch
 from .engine.integrators.integrator import Integrator
 from .instruments.correlations import (
@@ -70,7 +71,6 @@ from .interactions.potentials.mie import LennardJones, Mie
 from .interactions.potentials.morse import Morse
 from .interactions.potentials.soft_sphere import SoftSphere
 from .interactions.potentials.yukawa import Yukawa
-from .interactions.scene import Scene
 from .interactions.solid.elastic_solid import ElasticSolid
 from .interactions.thermostats.cell_rescaling import CellRescaling
 from .interactions.thermostats.langevin import Langevin

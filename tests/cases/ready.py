@@ -6,6 +6,7 @@ from particlesim.commands.scene_files import load_scene, ready_scenes
 
 # Options that make scenes small; the others are.
 SMALL = {
+    "cloth_drape": {"cells": 12},
     "dam_break": {"spacing": 0.05},
     "elastic_rings": {"spacing": 0.25},
     "elliptical_drop": {"across": 20},
@@ -23,6 +24,7 @@ SMALL = {
     "polytrope": {"count": 300},
     "rain_on_cloth": {"spacing": 0.05},
     "rising_bubble": {"across": 12},
+    "rope_bridge": {"planks": 12},
     "sedov_blast": {"side": 10},
     "sloshing_tank": {"spacing": 0.05},
     "sod_tube": {"count": 90},
@@ -36,13 +38,16 @@ SMALL = {
 # plummer_sphere for gravity, lj_melt for liquids, pile for contacts, spring_lattice for solids;
 # these themselves are swept in the long one.
 LONG = {
-    "elastic_rings", "elliptical_drop", "floating_block", "freezing", "galaxy_collision",
-    "hydrostatic_tank", "molten_salt", "phase_transition", "poiseuille", "polymer_melt",
-    "polytrope", "rain_on_cloth", "rising_bubble", "sedov_blast", "sloshing_tank",
-    "standing_wave", "star_collision", "taylor_green", "toy_star",
+    "cantilever", "catenary", "cloth_drape", "elastic_rings", "elliptical_drop", "floating_block",
+    "freezing", "galaxy_collision", "hydrostatic_tank", "molten_salt", "phase_transition",
+    "poiseuille", "polymer_melt", "polytrope", "rain_on_cloth", "rising_bubble", "rope_bridge",
+    "sedov_blast", "sloshing_tank", "standing_wave", "star_collision", "taylor_green", "toy_star",
 }  # fmt: skip
 # Whose kernels nobody shares, and take long to make: all that is done with them is for that run.
-LATER = {"floating_block", "poiseuille", "rising_bubble", "sloshing_tank"}
+LATER = {
+    "cantilever", "catenary", "cloth_drape", "floating_block", "poiseuille", "rising_bubble",
+    "rope_bridge", "sloshing_tank",
+}  # fmt: skip
 
 
 def every():

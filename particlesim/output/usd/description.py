@@ -101,8 +101,8 @@ class MeshPrim:
         color: (r, g, b) in 0..1, linear.
         indices: Rows of the frame arrays, a slice with both ends or (n,) int, for a surface that
             is spanned by particles. Then normals are the area-weighted means of the triangles.
-        triangles: (t, 3) int into the surface's own points, counterclockwise from outside. None,
-            with the indices: points, triangles and normals come with every frame.
+        triangles: (t, 3) int into the surface's own points, counterclockwise from outside. None:
+            they come with every frame, without indices as points, triangles and normals.
     """
 
     world: int
@@ -114,13 +114,14 @@ class MeshPrim:
     def __post_init__(self) -> None:
         owner = "MeshPrim"
         named(owner, self)
-        if (self.indices is None) != (self.triangles is None):
+        if self.indices is None and self.triangles is not None:
             raise validate.fail(
-                owner, "triangles", "be given with indices, or neither", self.triangles,
+                owner, "triangles", "be None without indices", self.triangles,
                 "give both, or all with every frame",
             )  # fmt: skip
         if self.indices is not None:
             replace(self, "indices", row_indices(owner, "indices", self.indices))
+        if self.triangles is not None:
             checked = validate.triangles(owner, self.triangles, len(self.rows), proper=False)
             replace(self, "triangles", checked)
 

@@ -35,9 +35,10 @@ class FrameData:
 class UsdRecorder(Recorder):
     """Records the frames of a simulation into a USD file, each safe as soon as it is written.
 
-    Groups are drawn as points; those that were given triangles as meshes with normals. Pairs of
-    constraints and springs are drawn as curves, unless both ends are in one mesh, and until they
-    break. Boundaries are meshes, and have a transform in every frame where they move.
+    Groups are drawn as points; those that were given triangles as meshes with normals, less the
+    triangles of which an edge is broken. Pairs of constraints and springs are drawn as curves,
+    unless both ends are in one mesh, and until they break. Boundaries are meshes, and have a
+    transform in every frame where they move.
 
     Args:
         sim: The simulation.

@@ -1,4 +1,4 @@
-"""Points and velocities to start from: fillings of shapes, lattices, random points.
+"""Points and velocities to start from: fillings of shapes, lattices, random points, meshes.
 
 Every function returns float64 rows of three, on the host, and the same ones for the same
 arguments: randomness comes from a ``seed``. A length is in the scene's own unit.
@@ -13,21 +13,36 @@ range, negative counts) are a ``ValueError``; a function's docstring names only 
 """
 
 from .arrange import links, rotate
+from .curves import curve
 from .distributions import maxwell_boltzmann, random, stretch, uniform_sphere
+from .files import mesh
+from .meshes import edges, hinges, icosphere, inside, rectangle
 from .plummer import plummer, plummer_velocity
 from .shapes import box, cylinder, lattice, sphere
+from .solids import box_tetrahedra, mesh_points, mesh_tetrahedra, surface
 
 __all__ = [
     "box",
+    "box_tetrahedra",
+    "curve",
     "cylinder",
+    "edges",
+    "hinges",
+    "icosphere",
+    "inside",
     "lattice",
     "links",
     "maxwell_boltzmann",
+    "mesh",
+    "mesh_points",
+    "mesh_tetrahedra",
     "plummer",
     "plummer_velocity",
     "random",
+    "rectangle",
     "rotate",
     "sphere",
     "stretch",
+    "surface",
     "uniform_sphere",
 ]

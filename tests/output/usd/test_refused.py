@@ -183,7 +183,10 @@ def test_values_that_do_not_fit_are_refused(tmp_path, refused, changed, match):
     [
         (lambda: group(indices=None), "ids and widths must be None and one number"),
         (lambda: group(ids=np.zeros(COUNT, int)), "ids must be different"),
-        (lambda: MeshPrim(0, "x", BLUE, slice(0, 3)), "triangles must be given with indices"),
+        (
+            lambda: MeshPrim(0, "x", BLUE, None, [(0, 1, 2)]),
+            "triangles must be None without indices",
+        ),
         (lambda: MeshPrim(0, "x", BLUE, slice(0, 3), [[0, 1, 3]]), "hold indices from 0 to 2"),
         (
             lambda: Shape("mesh", (np.eye(3), [[0, 1, 3]])),

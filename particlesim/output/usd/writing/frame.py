@@ -114,7 +114,7 @@ class FrameChecker:
         fields: Mapping[str, Any] | None,
         rows: Mapping[PointsPrim, tuple[Any, Any]] | None,
         pairs: Mapping[LinksPrim, Any] | None,
-        meshes: Mapping[MeshPrim, tuple[Any, Any, Any]] | None,
+        meshes: Mapping[MeshPrim, Any] | None,
         poses: Mapping[Shape, tuple[Any, Any]] | None,
         notes: Mapping[str, Any] | None,
         box: Any,
@@ -142,7 +142,7 @@ class FrameChecker:
             for name, kind in self.fields.items()
         }
         surfaces = [_surface(prim, found, x, v, number) for prim, found in _paired(
-            "meshes", info.meshes, [prim.indices is None for prim in info.meshes], meshes
+            "meshes", info.meshes, [prim.triangles is None for prim in info.meshes], meshes
         )]  # fmt: skip
         matrices = [
             None if found is None else _pose(shape, *found)
@@ -227,17 +227,18 @@ def _cloud(prim: PointsPrim, found: tuple[Any, Any] | None) -> tuple[Any, np.nda
 
 def _surface(
     prim: MeshPrim,
-    found: tuple[Any, Any, Any] | None,
+    found: Any,
     x: np.ndarray,
     v: np.ndarray,
     number: int,
 ) -> Surface:
     """A mesh: of a group as it is now, or as given."""
-    if prim.triangles is not None:
-        points = x[prim.indices]
-        normals = vertex_normals(points, prim.triangles)
-        return Surface(points, normals, None, v[prim.indices], prim.indices)
-    assert found is not None
+    if prim.indices is not None:
+        points, own = x[prim.indices], prim.triangles
+        if own is None:
+            found = validate.triangles(OWNER, found, len(points), proper=False)
+        normals = vertex_normals(points, found if own is None else own)
+        return Surface(points, normals, found, v[prim.indices], prim.indices)
     points, normals = (
         validate.rows(OWNER, f"at frame {number} {name} of {prim.name!r}", array, None, 3)
         for name, array in (("points", found[0]), ("normals", found[2]))

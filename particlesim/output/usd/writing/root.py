@@ -155,8 +155,7 @@ class _Root:
         straight(spec, None if prim.pairs is None else len(prim.pairs), prim.width)
 
     def mesh(self, prim: MeshPrim, path: Sdf.Path, fields: Fields) -> None:
-        fixed = prim.triangles is not None
-        colored = fixed and "displayColor" in fields
+        colored = prim.indices is not None and "displayColor" in fields
         spec = self.materials.gprim(path, "Mesh", prim.name, prim.color, colored=colored)
         declare_mesh(spec, prim, fields)
         surface(spec)

@@ -74,7 +74,7 @@ def declare_mesh(spec: Sdf.PrimSpec, prim: MeshPrim, fields: Fields) -> None:
     if prim.triangles is None:
         author(spec, "faceVertexCounts", Types.IntArray)
         author(spec, "faceVertexIndices", Types.IntArray)
-    else:
+    if prim.indices is not None:
         author(spec, "velocities", Types.Vector3fArray)
         _declare_fields(spec, fields)
 

@@ -108,7 +108,7 @@ class UsdWriter(files.Closing):
         *,
         rows: Mapping[PointsPrim, tuple[Any, Any]] | None = None,
         pairs: Mapping[LinksPrim, Any] | None = None,
-        meshes: Mapping[MeshPrim, tuple[Any, Any, Any]] | None = None,
+        meshes: Mapping[MeshPrim, Any] | None = None,
         poses: Mapping[Shape, tuple[Any, Any]] | None = None,
         notes: Mapping[str, Any] | None = None,
         box: Any = None,
@@ -122,8 +122,8 @@ class UsdWriter(files.Closing):
             fields: (n,) or (n, 3) for every name the writer was made with.
             rows: Of every group without indices: its rows (k,) int, and their ids (k,) int.
             pairs: Of all links without pairs: theirs, (m, 2) int rows.
-            meshes: Of every surface without indices: points (p, 3) [length], triangles (t, 3) int
-                into them, counterclockwise from outside, and normals (p, 3).
+            meshes: Of every surface without triangles: theirs (t, 3) int, counterclockwise from
+                outside; without indices, points (p, 3) [length], triangles and normals (p, 3).
             poses: Of every moving shape: translation (3,) [length] and rotation (3, 3).
             notes: Words and numbers to keep in the frame's file, as layer data ``particlesim``.
             box: Of a flexible periodic box its lengths, (3,) [length].

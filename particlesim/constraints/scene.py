@@ -5,15 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from ..interactions.filling import VISCOSITY, fill
+from ..interactions.fluid.smoothing import SmoothingFunction
+from ..interactions.fluid.sph import SPH
+from ..interactions.fluid.viscosities import Viscosity
 from ..scene import scene
-from .filling import VISCOSITY, fill
-from .fluid.smoothing import SmoothingFunction
-from .fluid.sph import SPH
-from .fluid.viscosities import Viscosity
+from .bodies.cloth import add_cloth
+from .bodies.rope import add_rope
 
 
 class Scene(scene.Scene):
     __doc__ = scene.Scene.__doc__
+
+    add_rope = add_rope
+    add_cloth = add_cloth
 
     def add_fluid(
         self,
