@@ -234,6 +234,7 @@ class Constraint(ReadTuples):
 
     def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if self.count and dt > 0:
+            self.velocities.straighten(dt)
             self.velocities.damp(dt)
         if self.count and self.break_force is not None:
             self._strain(may_break=True)
