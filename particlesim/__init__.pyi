@@ -9,6 +9,7 @@ from .accuracy.tune.report import Tuned
 from .accuracy.tune.tuning import tune
 from .constraints.boundary import Boundary
 from .constraints.boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
+from .constraints.clusters.shape_matching import ShapeMatching
 from .constraints.constraint import Constraint
 from .constraints.contact import Contact
 from .constraints.distance import Distance
@@ -153,6 +154,7 @@ __all__ = [
     "RadialDistribution",
     "Scene",
     "Settings",
+    "ShapeMatching",
     "Simulation",
     "SimulationError",
     "SimulationWarning",
