@@ -10,6 +10,7 @@ from .accuracy.tune.tuning import tune
 from .constraints.boundaries.round import CapsuleBoundary, CylinderBoundary
 from .constraints.boundary import Boundary
 from .constraints.boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
+from .constraints.clusters.shape_matching import ShapeMatching
 from .constraints.constraint import Constraint
 from .constraints.contact import Contact
 from .constraints.distance import Distance
@@ -156,6 +157,7 @@ __all__ = [
     "RadialDistribution",
     "Scene",
     "Settings",
+    "ShapeMatching",
     "Simulation",
     "SimulationError",
     "SimulationWarning",

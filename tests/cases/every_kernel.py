@@ -156,6 +156,15 @@ def constrained(periodic, *, breaks, bounces):
     return scene
 
 
+def clustered():
+    """A small cluster, and one of several chunks; all that they can do."""
+    scene = particles()
+    scene.add_constraint(
+        ps.ShapeMatching([range(6), range(6, 600)], 1.0, yield_strain=0.1, break_force=1.0)
+    )
+    return scene
+
+
 def attracted(s, **attributes):
     scene = particles(**attributes)
     scene.add_interaction(ps.Gravity(softening=s))
@@ -189,6 +198,7 @@ SCENES = {
     "gas_dynamics": (lambda: heated(smoothing_length=ps.AdaptiveSmoothing()), VERLET),
     "constraints": (lambda: constrained(None, breaks=False, bounces=True), {"ledger": True}),
     "breaking": (lambda: constrained(BOX, breaks=True, bounces=False), {"compensated": False}),
+    "clusters": (clustered, {"compensated": False}),
     "tree": (lambda: attracted(0.1), {"opening_angle": 0.5}),
     "own_softening": (lambda: attracted(None, softening=0.1), {"opening_angle": 0.5}),
     **{name: (lambda name=name: load_scene(name).build(), {}) for name in ready_scenes()},
@@ -196,5 +206,5 @@ SCENES = {
 
 EVERY_KERNEL = (
     "forces", "charged", "damped", "periodic_forces", "fluid", "constraints", "breaking",
-    "gas_dynamics", "star_collision", "tree", "continuity",
+    "gas_dynamics", "star_collision", "tree", "continuity", "clusters",
 )  # fmt: skip

@@ -21,6 +21,7 @@ PAIRS = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (6, 7)]
 TUPLES = {
     "pairs": PAIRS, "particles": PAIRS, "triples": [(0, 1, 3), (1, 3, 7), (4, 5, 7), (2, 6, 4)],
     "quadruples": [(0, 1, 3, 7), (5, 4, 6, 2), (0, 2, 6, 7)],
+    "clusters": [(0, 1, 3, 7, 2), (5, 4, 6, 2, 0)],
 }  # fmt: skip
 
 
@@ -129,8 +130,8 @@ LAWS = {
 PLAIN = {**TUPLES, "group": None, "exponents": (12, 6)}
 LEFT_OUT = {"break_force", "inequality", "tension_only", "truncation", "inside", "potential",
             "smoothing", "density", "dimension", "viscosity", "pivot", "drawn", "mixing", "groups",
-            "exclude", "switch", "method", "tolerance", "slip", "capped",
-            ("Electrostatics", "cutoff"), ("Electrostatics", "damping"),
+            "exclude", "switch", "method", "tolerance", "slip", "capped", "rest", "yield_strain",
+            "creep", "largest_strain", ("Electrostatics", "cutoff"), ("Electrostatics", "damping"),
             ("Gravity", "cutoff")}  # fmt: skip
 # What is of one machinery is tried by its kin in every run, and itself in the long one.
 KIN = {

@@ -91,6 +91,8 @@ PARTS = {
     ps.Scene: {"meters_per_unit": 1.0, "periodic": ((0, 0, 0), (1, 1, 1))},
     ps.Settings: {"dt": 0.1, "skin": 0.1, "relaxation": 0.5, "depenetration_speed": 1.0,
                   "opening_angle": 0.5, "substeps": 2, "iterations": 2, "threads": 1},
+    ps.ShapeMatching: {"clusters": [[0, 1, 2]], "compliance": 0.1, "yield_strain": 0.1,
+                       "creep": 1.0, "largest_strain": 0.5, "break_force": 1.0},
     ps.SoftSphere: {"epsilon": 1.0, "sigma": 1.0, "exponent": 2.0},
     ps.Springs: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0, "damping": 0.1},
     ps.SurfaceTension: {"fluid": FLUIDS, "coefficient": 1.0},
@@ -103,8 +105,9 @@ OPEN = {(ps.BoxBoundary, "lower"), (ps.BoxBoundary, "upper")}  # a side may be i
 NEVER = {
     (ps.Constraint, "break_force"),
     (ps.Distance, "break_force"),
+    (ps.ShapeMatching, "break_force"),
 }  # may be infinite: unbreakable
-INDICES = {"pairs", "triples", "quadruples", "particles"}
+INDICES = {"clusters", "pairs", "triples", "quadruples", "particles"}
 SIGNED = {"start", "end", "velocity", "angular_velocity", "pivot", "drawn",
           "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
           "periodic", "G", "pressure"}  # fmt: skip
