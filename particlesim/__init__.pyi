@@ -7,6 +7,7 @@ from .accuracy.tradeoff.sweep import tradeoff
 from .accuracy.tradeoff.table import Tradeoff
 from .accuracy.tune.report import Tuned
 from .accuracy.tune.tuning import tune
+from .constraints.boundaries.mesh import MeshBoundary
 from .constraints.boundaries.round import CapsuleBoundary, CylinderBoundary
 from .constraints.boundary import Boundary
 from .constraints.boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
@@ -139,6 +140,7 @@ __all__ = [
     "Ledger",
     "LennardJones",
     "Measured",
+    "MeshBoundary",
     "Mie",
     "Morse",
     "MuellerViscosity",

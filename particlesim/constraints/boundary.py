@@ -252,7 +252,7 @@ class Boundary(Holding):
             gap = np.abs(self.distance(points + length * np.eye(3)[axis]) - d).max()
             if not gap <= 1e-6 * length[axis]:
                 raise validate.fail(
-                    self.name, f"law {self.law.name}",
+                    self.name, f"law {self.law.name}" if hasattr(self, "law") else "surface",
                     f"be the same one period on, {length[axis]:g} along {'xyz'[axis]} [length]",
                     f"a difference of {gap:g}", "give it that period, or leave the axis open",
                 )  # fmt: skip

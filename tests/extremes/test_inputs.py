@@ -33,6 +33,7 @@ def wave(angle: float, level: float):
     return level * wp.cos(angle)
 
 
+TETRAHEDRON = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
 # Arguments that each part can be made with.
 PARTS = {
     ps.AdaptiveSmoothing: {"eta": 1.2, "largest": 1.0},
@@ -78,6 +79,10 @@ PARTS = {
     ps.LennardJones: {"epsilon": 1.0, "sigma": 1.0, "cutoff": 2.5},
     ps.GridField: {"lower": (0, 0, 0), "upper": (1, 1, 1), "spacing": 0.1, "speed": 1.0,
                    "density": 1.0, "damping": 0.1},
+    ps.MeshBoundary: {
+        "vertices": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], "triangles": TETRAHEDRON,
+        "thickness": 0.1,
+    },
     ps.Mie: {"epsilon": 1.0, "sigma": 1.0, "cutoff": 2.5},
     ps.Morse: {"depth": 1.0, "steepness": 1.0, "distance": 1.0, "cutoff": 2.5},
     ps.PairForce: {"law": pull, "cutoff": 1.0, "strength": 1.0},
@@ -104,8 +109,8 @@ NEVER = {
     (ps.Constraint, "break_force"),
     (ps.Distance, "break_force"),
 }  # may be infinite: unbreakable
-INDICES = {"pairs", "triples", "quadruples", "particles"}
-SIGNED = {"start", "end", "velocity", "angular_velocity", "pivot", "drawn",
+INDICES = {"pairs", "triangles", "triples", "quadruples", "particles"}
+SIGNED = {"start", "end", "vertices", "velocity", "angular_velocity", "pivot", "drawn",
           "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
           "periodic", "G", "pressure"}  # fmt: skip
 
