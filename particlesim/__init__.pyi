@@ -7,8 +7,10 @@ from .accuracy.tradeoff.sweep import tradeoff
 from .accuracy.tradeoff.table import Tradeoff
 from .accuracy.tune.report import Tuned
 from .accuracy.tune.tuning import tune
+from .constraints.boundaries.heightfield import HeightfieldBoundary
 from .constraints.boundaries.mesh import MeshBoundary
 from .constraints.boundaries.round import CapsuleBoundary, CylinderBoundary
+from .constraints.boundaries.sampled import SDFBoundary
 from .constraints.boundary import Boundary
 from .constraints.boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
 from .constraints.constraint import Constraint
@@ -127,6 +129,7 @@ __all__ = [
     "Group",
     "HarmonicAngles",
     "HarmonicBonds",
+    "HeightfieldBoundary",
     "HertzianGrains",
     "History",
     "IdealGas",
@@ -156,6 +159,7 @@ __all__ = [
     "Profile",
     "QuinticSpline",
     "RadialDistribution",
+    "SDFBoundary",
     "Scene",
     "Settings",
     "Simulation",

@@ -16,10 +16,10 @@ from ..kernels.constraints import walls
 from ..kernels.precision import FLOAT64, Precision, structure
 from ..scene.law import Law
 from ..scene.law import law as make_law
+from .boundaries.drawing import level_set, nodes
 from .holding import Holding
 
 STILL = (0.0, 0.0, 0.0)
-CELLS = 64  # along the longest side of what is drawn
 PLACES = 4096  # at which a law is asked for its period
 # Arguments of every boundary.
 OWN = frozenset(
@@ -200,21 +200,11 @@ class Boundary(Holding):
 
     def shapes(self) -> list[dict[str, Any]]:
         """Its surface in the box that is drawn, clear where it closes in the particles."""
-        from warp.geometry import IsoSurfaceMarchingCubes
-
         if self._box is None:
             return []
-        lower, upper = self._box
-        nodes = 1 + np.ceil(CELLS * (upper - lower) / (upper - lower).max()).astype(int)
-        axes = [np.linspace(*ends) for ends in zip(lower, upper, nodes, strict=True)]
-        d = self.distance(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3))
-        d = d.reshape(nodes)
-        field = wp.array(d, dtype=wp.float32, device="cpu")
-        points, corners = IsoSurfaceMarchingCubes.extract(field, lower=lower, upper=upper)
-        triangles = corners.numpy().reshape(-1, 3)
-        inside = bool(d[np.ix_([0, -1], [0, -1], [0, -1])].max() < 0)
-        mesh = {"points": points.numpy(), "triangles": triangles, "container": inside}
-        return [self._shape("mesh", **mesh)] if len(triangles) else []
+        places, counts = nodes(*self._box)
+        mesh = level_set(self.distance(places).reshape(counts), *self._box)
+        return [self._shape("mesh", **mesh)] if mesh else []
 
     def _shape(self, kind: str, **parameters: Any) -> dict[str, Any]:
         """A shape for recordings, which ask a moving one for its pose."""

@@ -73,6 +73,9 @@ PARTS = {
     ps.DFSPH: {"smoothing_length": 0.1, "rest_density": 1.0},
     ps.HarmonicAngles: {"triples": [(0, 1, 2)], "stiffness": 1.0, "rest_angle": 2.0},
     ps.HarmonicBonds: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0},
+    ps.HeightfieldBoundary: {
+        "heights": [(0, 1), (0, 2)], "lower": (0, 0, 0), "spacing": 0.5, "pivot": (0, 0, 0),
+    },
     ps.IdealGas: {"gamma": 1.4},
     ps.Isothermal: {"sound_speed": 1.0},
     ps.LaminarViscosity: {"kinematic_viscosity": 0.1},
@@ -91,6 +94,7 @@ PARTS = {
     ps.PlaneBoundary: {"point": (0, 0, 0), "normal": (0, 1, 0), "friction": 0.1},
     ps.PoissonField: {"lower": (0, 0, 0), "upper": (1, 1, 1), "spacing": 0.1},
     ps.Polytrope: {"constant": 1.0, "index": 1.0},
+    ps.SDFBoundary: {"distance": np.ones((2, 2, 3)), "lower": (0, 0, 0), "spacing": 0.5},
     ps.SPH: {"smoothing_length": 0.1, "rest_density": 1.0,
              "equation_of_state": ps.Polytrope(1.0, 1.0)},
     ps.Scene: {"meters_per_unit": 1.0, "periodic": ((0, 0, 0), (1, 1, 1))},
@@ -110,7 +114,7 @@ NEVER = {
     (ps.Distance, "break_force"),
 }  # may be infinite: unbreakable
 INDICES = {"pairs", "triangles", "triples", "quadruples", "particles"}
-SIGNED = {"start", "end", "vertices", "velocity", "angular_velocity", "pivot", "drawn",
+SIGNED = {"start", "end", "vertices", "heights", "velocity", "angular_velocity", "pivot", "drawn",
           "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
           "periodic", "G", "pressure"}  # fmt: skip
 
