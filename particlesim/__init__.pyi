@@ -9,6 +9,7 @@ from .accuracy.tune.report import Tuned
 from .accuracy.tune.tuning import tune
 from .constraints.boundaries.heightfield import HeightfieldBoundary
 from .constraints.boundaries.mesh import MeshBoundary
+from .constraints.boundaries.motion import Keyframes, Trajectory
 from .constraints.boundaries.round import CapsuleBoundary, CylinderBoundary
 from .constraints.boundaries.sampled import SDFBoundary
 from .constraints.boundary import Boundary
@@ -137,6 +138,7 @@ __all__ = [
     "Integrator",
     "Interaction",
     "Isothermal",
+    "Keyframes",
     "LaminarViscosity",
     "Langevin",
     "Law",
@@ -179,6 +181,7 @@ __all__ = [
     "Tait",
     "Thermostat",
     "Tradeoff",
+    "Trajectory",
     "Tuned",
     "UniformGravity",
     "UsdRecorder",

@@ -134,7 +134,7 @@ TETRAHEDRON = [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)]
 PLAIN = {**TUPLES, "triangles": TETRAHEDRON, "group": None, "exponents": (12, 6)}
 LEFT_OUT = {"break_force", "inequality", "tension_only", "truncation", "inside", "potential",
             "smoothing", "density", "dimension", "viscosity", "pivot", "drawn", "mixing", "groups",
-            "exclude", "switch", "method", "tolerance", "slip", "capped", "sheet",
+            "exclude", "switch", "method", "tolerance", "slip", "capped", "sheet", "motion",
             ("Electrostatics", "cutoff"), ("Electrostatics", "damping"),
             ("Gravity", "cutoff")}  # fmt: skip
 # What is of one machinery is tried by its kin in every run, and itself in the long one.

@@ -78,6 +78,8 @@ PARTS = {
     },
     ps.IdealGas: {"gamma": 1.4},
     ps.Isothermal: {"sound_speed": 1.0},
+    ps.Keyframes: {"times": [0.0, 1.0], "places": [(0, 0, 0), (0, 1, 0)],
+                   "turns": [(0, 0, 0), (0, 1, 0)]},
     ps.LaminarViscosity: {"kinematic_viscosity": 0.1},
     ps.LennardJones: {"epsilon": 1.0, "sigma": 1.0, "cutoff": 2.5},
     ps.GridField: {"lower": (0, 0, 0), "upper": (1, 1, 1), "spacing": 0.1, "speed": 1.0,
@@ -114,8 +116,8 @@ NEVER = {
     (ps.Distance, "break_force"),
 }  # may be infinite: unbreakable
 INDICES = {"pairs", "triangles", "triples", "quadruples", "particles"}
-SIGNED = {"start", "end", "vertices", "heights", "velocity", "angular_velocity", "pivot", "drawn",
-          "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
+SIGNED = {"velocity", "angular_velocity", "pivot", "drawn", "times", "places", "turns", "start", "end",
+          "vertices", "heights", "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
           "periodic", "G", "pressure"}  # fmt: skip
 
 

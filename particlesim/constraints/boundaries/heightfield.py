@@ -12,6 +12,7 @@ from ... import validate
 from ...kernels.constraints.boundaries import grids as kernels
 from ...kernels.precision import Precision
 from ..boundary import STILL
+from .motion import Motion
 from .nearest import NearestBoundary
 
 
@@ -35,6 +36,7 @@ class HeightfieldBoundary(NearestBoundary):
         angular_velocity: About the pivot, (3,) [rad/time].
         pivot: What it turns about, as described, (3,) [length].
         slip: A fluid slips along it; False: a viscous one sticks to it.
+        motion: A ``Trajectory`` or ``Keyframes`` in the place of both velocities.
 
     Raises:
         ValueError: Values out of range; a periodic scene, but for an axis along which all heights
@@ -54,9 +56,9 @@ class HeightfieldBoundary(NearestBoundary):
         self, heights: Any, lower: Sequence[float], spacing: float, friction: float = 0.0,
         restitution: float = 0.0, group: Any = None, *, up: str = "y",
         velocity: Sequence[float] = STILL, angular_velocity: Sequence[float] = STILL,
-        pivot: Sequence[float] = STILL, slip: bool = True,
+        pivot: Sequence[float] = STILL, slip: bool = True, motion: Motion | None = None,
     ):  # fmt: skip
-        self._holds(friction, restitution, group, velocity, angular_velocity, slip)
+        self._holds(friction, restitution, group, velocity, angular_velocity, slip, motion)
         self.pivot = validate.vector(self.name, "pivot", pivot, unit="length")
         self.heights = validate.grid(self.name, "heights", heights, 2)
         self.lower = validate.vector(self.name, "lower", lower, unit="length")

@@ -14,6 +14,7 @@ from ...kernels.constraints.boundaries import mesh as kernels
 from ...kernels.precision import Precision
 from ...scene.group import select
 from ..boundary import STILL
+from .motion import Motion
 from .nearest import NearestBoundary
 
 FLAT = 1e-12  # of the square of its longest side, below which a triangle has no area
@@ -46,6 +47,7 @@ class MeshBoundary(NearestBoundary):
         angular_velocity: About the pivot, (3,) [rad/time].
         pivot: What it turns about, as described, (3,) [length].
         slip: A fluid slips along it; False: a viscous one sticks to it.
+        motion: A ``Trajectory`` or ``Keyframes`` in the place of both velocities.
 
     Raises:
         ValueError: Values out of range; triangles without area, or of vertices that are not there;
@@ -67,9 +69,9 @@ class MeshBoundary(NearestBoundary):
         restitution: float = 0.0, group: Any = None, *, sheet: bool = False,
         thickness: float = 0.0, velocity: Sequence[float] = STILL,
         angular_velocity: Sequence[float] = STILL, pivot: Sequence[float] = STILL,
-        slip: bool = True,
+        slip: bool = True, motion: Motion | None = None,
     ):  # fmt: skip
-        self._holds(friction, restitution, group, velocity, angular_velocity, slip)
+        self._holds(friction, restitution, group, velocity, angular_velocity, slip, motion)
         self.pivot = validate.vector(self.name, "pivot", pivot, unit="length")
         self.inside, self.sheet = bool(inside), bool(sheet)
         self.thickness = validate.number(

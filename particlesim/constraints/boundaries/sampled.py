@@ -15,6 +15,7 @@ from ...kernels.precision import Precision
 from ...scene.law import Law
 from ..boundary import STILL, Boundary
 from .drawing import level_set
+from .motion import Motion
 from .nearest import NearestBoundary
 
 
@@ -43,6 +44,7 @@ class SDFBoundary(NearestBoundary):
         angular_velocity: About the pivot, (3,) [rad/time].
         pivot: What it turns about, as described, (3,) [length].
         slip: A fluid slips along it; False: a viscous one sticks to it.
+        motion: A ``Trajectory`` or ``Keyframes`` in the place of both velocities.
         **parameters: The law's further parameters.
 
     Raises:
@@ -63,9 +65,9 @@ class SDFBoundary(NearestBoundary):
         friction: float = 0.0, restitution: float = 0.0, group: Any = None, *,
         upper: Sequence[float] | None = None, velocity: Sequence[float] = STILL,
         angular_velocity: Sequence[float] = STILL, pivot: Sequence[float] = STILL,
-        slip: bool = True, **parameters: Any,
+        slip: bool = True, motion: Motion | None = None, **parameters: Any,
     ):  # fmt: skip
-        self._holds(friction, restitution, group, velocity, angular_velocity, slip)
+        self._holds(friction, restitution, group, velocity, angular_velocity, slip, motion)
         self.pivot = validate.vector(self.name, "pivot", pivot, unit="length")
         is_law = isinstance(distance, Law | Callable) and not isinstance(distance, wp.Volume)
         if isinstance(distance, wp.Volume):
