@@ -116,9 +116,9 @@ NEVER = {
     (ps.Distance, "break_force"),
 }  # may be infinite: unbreakable
 INDICES = {"pairs", "triangles", "triples", "quadruples", "particles"}
-SIGNED = {"velocity", "angular_velocity", "pivot", "drawn", "times", "places", "turns", "start", "end",
-          "vertices", "heights", "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
-          "periodic", "G", "pressure"}  # fmt: skip
+SIGNED = {"velocity", "angular_velocity", "pivot", "drawn", "times", "places", "turns", "start",
+          "end", "vertices", "heights", "level", "strength", "flow", "force", "acceleration",
+          "point", "normal", "lower", "upper", "periodic", "G", "pressure"}  # fmt: skip
 
 
 def numbers_of(part):
