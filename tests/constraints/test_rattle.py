@@ -34,7 +34,7 @@ def double_pendulum(a, b, time, steps=4000):
 
 def places(a, b):
     middle = np.array([np.sin(a), -np.cos(a), 0])
-    return np.array([np.zeros(3), middle, middle + [np.sin(b), -np.cos(b), 0]])
+    return np.array([np.zeros(3), middle, middle + np.array([np.sin(b), -np.cos(b), 0])])
 
 
 def swung(substeps, device, integrator="velocity_verlet", precision="float64"):

@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from cases.simulation import Holder, drifting
+from cases.simulation import drifting
 
 # Errors -----------------------------------------------------------------------------------------
 

@@ -4,6 +4,7 @@ import functools
 
 import warp as wp
 
+from ...engine.bounces import bounces_type
 from ...precision import FLOAT64, function, register
 from ...tensor import Tensor, virial_function
 from .members import Form, types, views
@@ -80,18 +81,17 @@ def spin_kernel(form: Form) -> wp.Kernel:
 
 
 @functools.cache
-def changes_kernel(form: Form) -> wp.Kernel:
-    """Kernel: the sums of each chunk over what has changed of velocities since ``v_0``."""
-    vec3, real = form.precision.vec3, form.precision.scalar
+def velocities_kernel(form: Form) -> wp.Kernel:
+    """Kernel: the sums of each chunk over velocities."""
+    real = form.precision.scalar
     Clusters, Bodies, Boxes = types(form)
     own = views(form)
     seen, wide, centre = own.seen, own.wide, own.middle
 
     @register
-    def add_up_changes(
-        first: int, box: Boxes, c: Clusters, b: Bodies, start: int,
-        v_0: wp.array(dtype=vec3), rates_out: wp.array(dtype=Rates),
-    ):  # fmt: skip
+    def add_up_velocities(
+        first: int, box: Boxes, c: Clusters, b: Bodies, start: int, rates_out: wp.array(dtype=Rates)
+    ):
         n = start + first + wp.tid()
         k = c.cluster[n]
         origin = centre(k, c, b)
@@ -103,12 +103,12 @@ def changes_kernel(form: Form) -> wp.Kernel:
             s.r += m * r
             s.inertia += m * inertia(r)
             if b.w[i] > real(0.0):
-                u = wide(b.v[i]) - wide(v_0[i])
+                u = wide(b.v[i])
                 s.u += m * u
                 s.spin += m * wp.cross(r, u)
         rates_out[n] = s
 
-    return add_up_changes
+    return add_up_velocities
 
 
 @functools.cache
@@ -144,27 +144,28 @@ def fit_kernel(form: Form) -> wp.Kernel:
 
 @functools.cache
 def follow_kernel(form: Form) -> wp.Kernel:
-    """Kernel: velocities become ``v_0`` and a rigid motion; soft and broken clusters stay."""
-    vec3, real = form.precision.vec3, form.precision.scalar
+    """Kernel: velocities become those of the rigid motion; soft and broken clusters stay."""
+    vec3, real, Bounces = form.precision.vec3, form.precision.scalar, bounces_type(form.precision)
     Clusters, Bodies, Boxes = types(form)
     own = views(form)
-    seen, wide, gone = own.seen, own.wide, own.gone
+    seen, gone = own.seen, own.gone
 
     @register
     def follow_rigid_motions(
         first: int, box: Boxes, c: Clusters, b: Bodies, start: int,
-        v_0: wp.array(dtype=vec3), motion: wp.array(dtype=RigidMotion),
+        motion: wp.array(dtype=RigidMotion), bounces: Bounces,
     ):  # fmt: skip
         n = start + first + wp.tid()
         k = c.cluster[n]
+        if bounces.running[c.world[k]] == 0:
+            return
         if c.softness[k] == double(0.0) and not gone(k, c):
             move = motion[k]
             for e in range(c.begin[n], c.begin[n + 1]):
                 i = c.particle[e]
                 if b.w[i] > real(0.0):
                     r = seen(i, k, c.origin[k], box, c, b)
-                    change = move.u + wp.cross(move.spin, r - move.middle)
-                    b.v[i] = vec3(wide(v_0[i]) + change)
+                    b.v[i] = vec3(move.u + wp.cross(move.spin, r - move.middle))
 
     return follow_rigid_motions
 

@@ -190,26 +190,23 @@ class ShapeMatching(ConstraintBase):
         inputs = [may_break, self.struct, (1.0 / dt) ** 2, self.largest]
         launch(motion.strain_kernel(self.form), self.count, inputs, self.model.device)
 
-    @property
-    def bounces(self) -> bool:
-        """Whether velocities that change must do so as those of rigid bodies."""
-        return bool(self.count and self.rigid.any())
+    def bounce(self, state: State, neighbors: Neighbors, bounces: Any, dt: float) -> None:
+        """Velocities of rigid clusters become rigid, with the same momentum and angular momentum.
 
-    def bounce(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        """Make the velocities' change since ``state.bounce_velocity`` that of rigid bodies.
-
-        Momentum and angular momentum of the change are kept.
+        What members have bounced off by goes to all of their cluster so.
         """
+        if not self.count or not self.rigid.any():
+            return
         device, c, b = self.model.device, self.struct, self.bodies
         add_up, fit, follow = (
             kernel(self.form)
-            for kernel in (motion.changes_kernel, motion.fit_kernel, motion.follow_kernel)
+            for kernel in (motion.velocities_kernel, motion.fit_kernel, motion.follow_kernel)
         )
         for start, end, first, last in self.members.spans:
-            seen = [self.model.box, c, b, first, state.bounce_velocity]
+            seen = [self.model.box, c, b, first]
             launch(add_up, last - first, [*seen, self.rates], device)
             launch(fit, end - start, [c, b, start, self.rates, self.motion], device)
-            launch(follow, last - first, [*seen, self.motion], device)
+            launch(follow, last - first, [*seen, self.motion, bounces], device)
 
     def measure_stress(self, state: State, energy: wp.array, stress: wp.array) -> bool:
         """Add the virial of the last substep's forces, and the energy of soft clusters."""
