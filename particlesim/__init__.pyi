@@ -19,6 +19,7 @@ from .constraints.constraint import Constraint
 from .constraints.contact import Contact
 from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
+from .constraints.gradient import check_gradient
 from .constraints.scene import Scene
 from .engine.execution.launch import launch
 from .engine.integrators.integrator import Integrator
@@ -194,6 +195,7 @@ __all__ = [
     "WendlandC6",
     "Yukawa",
     "__version__",
+    "check_gradient",
     "launch",
     "law",
     "mean_square_displacement",
