@@ -9,6 +9,7 @@ from .accuracy.tune.report import Tuned
 from .accuracy.tune.tuning import tune
 from .constraints.boundary import Boundary
 from .constraints.boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
+from .constraints.clusters.joints import BallJoint, Hinge
 from .constraints.clusters.shape_matching import ShapeMatching
 from .constraints.constraint import Constraint
 from .constraints.contact import Contact
@@ -96,6 +97,7 @@ __all__ = [
     "AdaptiveSmoothing",
     "Angles",
     "ArtificialViscosity",
+    "BallJoint",
     "Barostat",
     "Bonds",
     "Boundary",
@@ -125,6 +127,7 @@ __all__ = [
     "HarmonicAngles",
     "HarmonicBonds",
     "HertzianGrains",
+    "Hinge",
     "History",
     "IdealGas",
     "Incident",

@@ -38,6 +38,8 @@ PARTS = {
     ps.AdaptiveSmoothing: {"eta": 1.2, "largest": 1.0},
     ps.Angles: {"triples": [(0, 1, 2)], "law": wave, "level": 1.0},
     ps.ArtificialViscosity: {"alpha": 0.1, "beta": 0.2},
+    ps.BallJoint: {"a": [0, 1, 2], "b": [3, 4, 5], "point": (0, 0, 0), "compliance": 0.1,
+                   "break_force": 1.0},
     ps.Bonds: {"pairs": [(0, 1)], "law": pull, "strength": 1.0},
     ps.Boundary: {
         "law": above, "friction": 0.1, "restitution": 0.5, "velocity": (0, 1, 0),
@@ -70,6 +72,8 @@ PARTS = {
     ps.DFSPH: {"smoothing_length": 0.1, "rest_density": 1.0},
     ps.HarmonicAngles: {"triples": [(0, 1, 2)], "stiffness": 1.0, "rest_angle": 2.0},
     ps.HarmonicBonds: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0},
+    ps.Hinge: {"a": [0, 1, 2], "b": [3, 4, 5], "point": (0, 0, 0), "axis": (0, 0, 1),
+               "lower": -0.5, "upper": 0.5, "compliance": 0.1, "break_force": 1.0},
     ps.IdealGas: {"gamma": 1.4},
     ps.Isothermal: {"sound_speed": 1.0},
     ps.LaminarViscosity: {"kinematic_viscosity": 0.1},
@@ -101,12 +105,14 @@ PARTS = {
 }  # fmt: skip
 OPEN = {(ps.BoxBoundary, "lower"), (ps.BoxBoundary, "upper")}  # a side may be infinitely far
 NEVER = {
+    (ps.BallJoint, "break_force"),
     (ps.Constraint, "break_force"),
     (ps.Distance, "break_force"),
+    (ps.Hinge, "break_force"),
     (ps.ShapeMatching, "break_force"),
 }  # may be infinite: unbreakable
-INDICES = {"clusters", "pairs", "triples", "quadruples", "particles"}
-SIGNED = {"velocity", "angular_velocity", "pivot", "drawn",
+INDICES = {"a", "b", "clusters", "pairs", "triples", "quadruples", "particles"}
+SIGNED = {"axis", "velocity", "angular_velocity", "pivot", "drawn",
           "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
           "periodic", "G", "pressure"}  # fmt: skip
 
