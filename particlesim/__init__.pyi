@@ -14,6 +14,7 @@ from .constraints.boundaries.round import CapsuleBoundary, CylinderBoundary
 from .constraints.boundaries.sampled import SDFBoundary
 from .constraints.boundary import Boundary
 from .constraints.boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
+from .constraints.clusters.joints import BallJoint, Hinge
 from .constraints.clusters.shape_matching import ShapeMatching
 from .constraints.constraint import Constraint
 from .constraints.contact import Contact
@@ -102,6 +103,7 @@ __all__ = [
     "AdaptiveSmoothing",
     "Angles",
     "ArtificialViscosity",
+    "BallJoint",
     "Barostat",
     "Bonds",
     "Boundary",
@@ -134,6 +136,7 @@ __all__ = [
     "HarmonicBonds",
     "HeightfieldBoundary",
     "HertzianGrains",
+    "Hinge",
     "History",
     "IdealGas",
     "Incident",

@@ -177,8 +177,9 @@ def clustered():
     """A small cluster, and one of several chunks; all that they can do."""
     scene = particles()
     scene.add_constraint(
-        ps.ShapeMatching([range(6), range(6, 600)], 1.0, yield_strain=0.1, break_force=1.0)
+        ps.ShapeMatching([range(8), range(6, 600)], 1.0, yield_strain=0.1, break_force=1.0)
     )
+    scene.add_constraint(ps.Hinge(range(8), range(8, 16), (0, 0, 0), (0, 0, 1), break_force=1.0))
     return scene
 
 
