@@ -11,7 +11,7 @@ from ... import validate
 from ...engine.limit import Limit
 from ...engine.probe import Probe
 from ...kernels.constraints.boundaries import nearest as kernels
-from ...kernels.parameters import parameter_types
+from ...kernels.parameters import by_name, parameter_types, structures
 from ...kernels.precision import FLOAT64, Precision, structure
 from ..boundary import Boundary
 from ..limits import crossing_limits
@@ -42,12 +42,8 @@ class NearestBoundary(Boundary):
         """
         x = validate.rows(f"{self.name}.distance", "points", points, None, 3)
         values = self._geometry("cpu", FLOAT64)
-        kinds = parameter_types(values, FLOAT64)
-        Params = structure(f"{type(self).__name__}Distance", kinds)
-        given = Params()
-        for name, value in values.items():
-            plain = isinstance(value, wp.array)
-            setattr(given, name, value if plain else kinds[name](value))
+        Params = structure(f"{type(self).__name__}Distance", parameter_types(values, FLOAT64))
+        given = structures(Params, by_name([values]), "cpu")
         kernel = kernels.nearest_kernel(self.near(FLOAT64, Params), Params)
         found = wp.empty(len(x), dtype=wp.float64, device="cpu")
         places = wp.array(x, dtype=wp.vec3d, device="cpu")
