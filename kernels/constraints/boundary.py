@@ -6,7 +6,14 @@ import warp as wp
 
 from ..engine.easing import ease_function, easing_type
 from ..precision import Precision, function, register
-from .boundaries.meeting import Form, held_type, meeting_function, seen_function, velocity_function
+from .boundaries.meeting import (
+    Form,
+    held_type,
+    meeting_function,
+    seen_function,
+    touching_function,
+    velocity_function,
+)
 from .boundary_shapes import normals_type
 from .constraints import bodies_type, place_function, rounding_function
 from .rigid_motion import frame_functions
@@ -125,11 +132,11 @@ def begin_kernel(form: Form) -> wp.Kernel:
 @functools.cache
 def project_kernel(form: Form) -> wp.Kernel:
     """Kernel: particles are brought back to where they may be, and held along it."""
-    _, sides, precision, params, compensated, _, _ = form
+    sides, precision, params, compensated = form[1:5]
     vec3, real = precision.vec3, precision.scalar
     Bodies, Held = bodies_type(precision), held_type(precision, sides)
     kept, place = rounding_function(precision, compensated), place_function(precision, compensated)
-    meet, rub = meeting_function(form), rubbing_function(form)
+    meet, rub, touching = meeting_function(form), rubbing_function(form), touching_function(form)
 
     @register
     def project_boundary(
@@ -149,7 +156,8 @@ def project_kernel(form: Form) -> wp.Kernel:
                 dx = dx + N[a] * back[a]
         if timed * p.friction > real(0.0):
             u = b.v[i] * dt + b.correction[i]
-            dx = dx - rub(k, x, u, dt, w, back, N, p.friction, h)
+            mu, _rest = touching(i, w, x, e, p, h)
+            dx = dx - rub(k, x, u, dt, w, back, N, mu, h)
         touched = dx[0] != real(0.0) or dx[1] != real(0.0) or dx[2] != real(0.0)
         if touched and b.w[i] > real(0.0):
             place(i, x, e, dx, b)
@@ -166,6 +174,7 @@ def bounce_kernel(form: Form, forces: bool) -> wp.Kernel:
     Bodies, Held = bodies_type(precision), held_type(precision, sides)
     kept, rebound = rounding_function(precision, form.compensated), bounce_function(precision)
     meet, velocity_of = meeting_function(form), velocity_function(form)
+    touching = touching_function(form)
 
     @register
     def bounce_boundary(
@@ -191,11 +200,12 @@ def bounce_kernel(form: Form, forces: bool) -> wp.Kernel:
                 if wp.static(forces):
                     before = before - f[i] * (b.w[i] * dt)
                 dv = vec3()
+                _mu, restitution = touching(i, w, x, kept(i, b) - c, p, h)
                 for a in range(wp.static(sides)):
                     if back[a] > real(0.0):
                         n = N[a]
                         now = wp.dot(v + dv, n)
-                        dv = dv + n * rebound(wp.dot(before, n), now, p.restitution)
+                        dv = dv + n * rebound(wp.dot(before, n), now, restitution)
                 b.v[i] = b.v[i] + dv
 
     return bounce_boundary

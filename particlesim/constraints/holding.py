@@ -33,6 +33,7 @@ class Holding(EasedConstraint):
     solid = True
     sides = 1  # at most how many of them a particle touches at once
     tracked = False  # its surface looks at the way of a substep
+    mixed = False  # its parts have frictions and restitutions of their own
     slip: bool
     places: tuple[int, ...] = (0,)  # see Wall
 
@@ -42,6 +43,10 @@ class Holding(EasedConstraint):
 
     def facing(self, precision: Precision, params: Any) -> wp.Function:
         """How far its sides are, as a Warp function (see kernels.constraints.walls)."""
+        raise NotImplementedError
+
+    def touch(self, precision: Precision, params: Any) -> wp.Function:
+        """Friction and restitution there (see kernels.constraints.boundaries.combined)."""
         raise NotImplementedError
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
@@ -108,7 +113,7 @@ class Holding(EasedConstraint):
         self.force = state.force if forces else wp.empty(0, dtype=precision.vec3, device=device)
         self.form = Form(
             self.surface(precision), self.sides, precision, self.Params, "position_error" in state,
-            self.moving, self.tracked,
+            self.moving, self.tracked, self.touch(precision, self.Params) if self.mixed else None,
         )  # fmt: skip
         self.begin_kernel = kernels.begin_kernel(self.form)
         self.project_kernel = kernels.project_kernel(self.form)

@@ -11,13 +11,13 @@ import warp as wp
 from ... import validate
 from ...kernels.constraints.boundaries import round as kernels
 from ...kernels.precision import Precision
-from ..boundary import STILL
+from .combined import ShapedBoundary
 from .drawing import revolved
 from .motion import Motion
-from .nearest import NearestBoundary
+from .solid import STILL
 
 
-class RoundBoundary(NearestBoundary):
+class RoundBoundary(ShapedBoundary):
     """Base of boundaries about the axis from ``start`` to ``end``; they turn about its middle."""
 
     def _round(self, start: Any, end: Any, radius: Any, inside: bool) -> None:
