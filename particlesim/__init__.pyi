@@ -7,6 +7,7 @@ from .accuracy.tradeoff.sweep import tradeoff
 from .accuracy.tradeoff.table import Tradeoff
 from .accuracy.tune.report import Tuned
 from .accuracy.tune.tuning import tune
+from .constraints.boundaries.combined import ComplementBoundary, UnionBoundary
 from .constraints.boundaries.heightfield import HeightfieldBoundary
 from .constraints.boundaries.mesh import MeshBoundary
 from .constraints.boundaries.motion import Keyframes, Trajectory
@@ -111,6 +112,7 @@ __all__ = [
     "Camera",
     "CapsuleBoundary",
     "CellRescaling",
+    "ComplementBoundary",
     "ConstantForce",
     "Constraint",
     "ConstraintBase",
@@ -190,6 +192,7 @@ __all__ = [
     "Trajectory",
     "Tuned",
     "UniformGravity",
+    "UnionBoundary",
     "UsdRecorder",
     "VelocityRescaling",
     "Viscosity",

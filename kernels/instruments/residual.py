@@ -67,7 +67,7 @@ def off_kernel(law: Solved) -> wp.Kernel:
 @functools.cache
 def boundary_kernel(form: Form) -> wp.Kernel:
     """Kernel: how deep each particle is inside of a boundary, on its worst side."""
-    _, sides, precision, params, compensated, _, _ = form
+    sides, precision, params, compensated = form[1:5]
     real, each = precision.scalar, precision.vector(sides)
     Bodies, Held = bodies_type(precision), held_type(precision, sides)
     meet, kept = meeting_function(form), rounding_function(precision, compensated)

@@ -167,6 +167,7 @@ def held():
                         thickness=0.1, velocity=(1, 0, 0), **touch),
         ps.SDFBoundary(np.ones((3, 3, 3)), (0, 0, 0), 5.0, **touch),
         ps.HeightfieldBoundary(np.zeros((3, 3)), (0, -20, 0), 5.0, **touch),
+        ps.SphereBoundary((0, 0, 0), 90.0, **touch) - ps.PlaneBoundary((0, -40, 0), (0, 1, 0)),
     ]  # fmt: skip
     for wall in walls:
         scene.add_constraint(wall)

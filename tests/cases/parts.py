@@ -154,7 +154,8 @@ KIN = {
     "SoftSphere": "PairPotential", "Coulomb": "PairPotential", "Electrostatics": "PairPotential",
 }  # fmt: skip
 # To a grid, which rests in the frame that it is made in, and to groups of several fluids.
-BOUND = ("FieldForce", "SurfaceTension", "HeightfieldBoundary", "SDFBoundary")
+BOUND = ("FieldForce", "SurfaceTension", "HeightfieldBoundary", "SDFBoundary", "UnionBoundary",
+         "ComplementBoundary")  # fmt: skip
 
 
 NU = Quantity(0.1, (2, 0, -1))
