@@ -7,6 +7,7 @@ from .accuracy.tradeoff.sweep import tradeoff
 from .accuracy.tradeoff.table import Tradeoff
 from .accuracy.tune.report import Tuned
 from .accuracy.tune.tuning import tune
+from .constraints.boundaries.round import CapsuleBoundary, CylinderBoundary
 from .constraints.boundary import Boundary
 from .constraints.boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
 from .constraints.constraint import Constraint
@@ -100,6 +101,7 @@ __all__ = [
     "Boundary",
     "BoxBoundary",
     "Camera",
+    "CapsuleBoundary",
     "CellRescaling",
     "ConstantForce",
     "Constraint",
@@ -109,6 +111,7 @@ __all__ = [
     "ContinuityDensity",
     "Coulomb",
     "CubicSpline",
+    "CylinderBoundary",
     "Dihedrals",
     "Distance",
     "Drag",

@@ -1,59 +1,15 @@
 """Boundaries that hold particles off by their radius: one skeleton, a surface plugged into it."""
 
 import functools
-from typing import Any, NamedTuple
 
 import warp as wp
 
 from ..engine.easing import ease_function, easing_type
-from ..precision import Precision, function, register, structure
+from ..precision import Precision, function, register
+from .boundaries.meeting import Form, held_type, meeting_function, seen_function, velocity_function
 from .boundary_shapes import normals_type
 from .constraints import bodies_type, place_function, rounding_function
-from .rigid_motion import frame_functions, pose_type
-
-
-class Form(NamedTuple):
-    """What the kernels of a boundary are made for.
-
-    Args:
-        surface: Where it is (see ``boundary_shapes``).
-        sides: At most how many of its sides a particle touches at once.
-        precision: Of the simulation.
-        params: Struct of what the surface takes, with friction and restitution.
-        compensated: Positions come with what rounding has kept from them.
-        moving: It has poses.
-    """
-
-    surface: wp.Function
-    sides: int
-    precision: Precision
-    params: Any
-    compensated: bool
-    moving: bool
-
-
-@functools.cache
-def held_type(precision: Precision, sides: int) -> Any:
-    """The particles that a boundary holds, with slack and grip by side.
-
-    Grip is how far friction may still take particles back in this substep: mu times the normal
-    corrections less what it has taken. It outlives an iteration, so that a side that one iteration
-    pressed on holds against what the next one does along it.
-    """
-    each = precision.vector(sides)
-    fields = {
-        "particle": wp.array(dtype=wp.int32),
-        "world": wp.array(dtype=wp.int32),
-        "radius": wp.array(dtype=precision.scalar),  # by particle
-        "slack": wp.array(dtype=each),
-        "marked": wp.array(dtype=wp.int32),  # worlds whose slack is to be measured
-        "grip": wp.array(dtype=each),  # empty where nothing rubs
-        "rebound": wp.array(dtype=each),  # speeds to bounce off at, 0: not; empty like grip
-        "impulse": wp.array(dtype=each),  # that have sent them off so far, over their masses
-        "pressed": wp.array(dtype=precision.vec3),  # how far it has moved them in a substep
-        "pose": wp.array(dtype=pose_type(precision)),  # by world; empty where nothing moves
-    }
-    return structure(f"Held{sides}_{precision.name}", fields)
+from .rigid_motion import frame_functions
 
 
 @functools.cache
@@ -74,48 +30,6 @@ def friction_function(precision: Precision) -> wp.Function:
         return t * factor
 
     return function(rub)
-
-
-@functools.cache
-def meeting_function(form: Form) -> wp.Function:
-    """``meet(i, w, x, e, slack, p, h) -> (back, N)``: what particle i at x + e meets in world w.
-
-    The way back to each side, and the sides' normals (see ``boundary_shapes``).
-    """
-    surface, sides, precision, params, _, moving = form
-    vec3, each, Held = precision.vec3, precision.vector(sides), held_type(precision, sides)
-    frame = frame_functions(precision)
-    inward, outward = frame.inward, frame.outward
-
-    def meet(i: int, w: int, x: vec3, e: vec3, slack: each, p: params, h: Held):
-        y = x
-        rest = e
-        if wp.static(moving):
-            y, rest = inward(y, rest, h.pose[w])
-        back, N = surface(y, rest, h.radius[i], slack, p)
-        if wp.static(moving):
-            for a in range(wp.static(sides)):
-                N[a] = outward(N[a], h.pose[w])
-        return back, N
-
-    # Emitted behind the surface, which may itself stand behind the gradient that it takes.
-    return function(meet, after_gradients=True)
-
-
-@functools.cache
-def velocity_function(form: Form) -> wp.Function:
-    """``velocity_of(x, v, w, h)``: the velocity v of what is at x, against the surface."""
-    precision, moving = form.precision, form.moving
-    vec3, Held = precision.vec3, held_type(precision, form.sides)
-    velocity = frame_functions(precision).velocity
-
-    def velocity_of(x: vec3, v: vec3, w: int, h: Held):
-        if wp.static(moving):
-            return v - velocity(x, h.pose[w])
-        else:
-            return v
-
-    return function(velocity_of)
 
 
 @functools.cache
@@ -159,10 +73,11 @@ def begin_kernel(form: Form) -> wp.Kernel:
         held_type(precision, sides),
         easing_type(precision),
     )
-    meet, velocity_of, ease = (
+    meet, velocity_of, ease, seen = (
         meeting_function(form),
         velocity_function(form),
         ease_function(precision),
+        seen_function(form),
     )
 
     @register
@@ -174,10 +89,12 @@ def begin_kernel(form: Form) -> wp.Kernel:
         w = h.world[k]
         p = parameters[w]
         slack = h.slack[k]
+        # Where the substep began: the way since is no overlap. The subtraction rounds as much as a
+        # compensated sum has kept.
+        start = b.x[i] - dt * velocity_of(b.x[i], b.v[i], w, h)
+        if wp.static(form.tracked):
+            h.start[i] = seen(start, w, h)
         if h.marked[w] != 0:
-            # Where the substep began: the way since is no overlap. The subtraction rounds as much
-            # as a compensated sum has kept.
-            start = b.x[i] - dt * velocity_of(b.x[i], b.v[i], w, h)
             slack, _N = meet(i, w, start, vec3(), each(), p, h)
         for a in range(wp.static(sides)):
             if slack[a] > real(0.0):
@@ -193,7 +110,7 @@ def begin_kernel(form: Form) -> wp.Kernel:
 @functools.cache
 def project_kernel(form: Form) -> wp.Kernel:
     """Kernel: particles are brought back to where they may be, and held along it."""
-    _, sides, precision, params, compensated, _ = form
+    _, sides, precision, params, compensated, _, _ = form
     vec3, real = precision.vec3, precision.scalar
     Bodies, Held = bodies_type(precision), held_type(precision, sides)
     kept, place = rounding_function(precision, compensated), place_function(precision, compensated)

@@ -4,7 +4,7 @@ import functools
 
 import warp as wp
 
-from ..constraints.boundary import Form, held_type, meeting_function
+from ..constraints.boundaries.meeting import Form, held_type, meeting_function
 from ..constraints.constraint_force import counted_function
 from ..constraints.constraints import Solved, bodies_type, rounding_function, view_function
 from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
@@ -79,7 +79,7 @@ def off_kernel(law: Solved) -> wp.Kernel:
 @functools.cache
 def boundary_kernel(form: Form) -> wp.Kernel:
     """Kernel: how deep each particle is inside of a boundary, on its worst side."""
-    _, sides, precision, params, compensated, _ = form
+    _, sides, precision, params, compensated, _, _ = form
     real, each = precision.scalar, precision.vector(sides)
     Bodies, Held = bodies_type(precision), held_type(precision, sides)
     meet, kept = meeting_function(form), rounding_function(precision, compensated)

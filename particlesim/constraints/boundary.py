@@ -158,7 +158,7 @@ class Boundary(Holding):
             (n,) [length], positive where particles may be.
         """
         x = validate.rows(f"{self.name}.distance", "points", points, None, 3)
-        values = self._geometry()
+        values = self._geometry("cpu", FLOAT64)
         kinds = {
             name: {wp.vec3: wp.vec3d, int: wp.int32}.get(self.law.parameters[name], wp.float64)
             for name in values
@@ -229,7 +229,7 @@ class Boundary(Holding):
         """Velocity and angular velocity, less what moves the shape in itself."""
         return self.velocity, self.angular_velocity
 
-    def _geometry(self) -> dict[str, Any]:
+    def _geometry(self, device: Any, precision: Precision) -> dict[str, Any]:
         """What the surface takes, by name."""
         return self.parameters
 

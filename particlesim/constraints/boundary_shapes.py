@@ -75,7 +75,7 @@ class PlaneBoundary(Boundary):
     def facing(self, precision: Precision, params: Any) -> wp.Function:
         return walls.plane_facing(precision, params)
 
-    def _geometry(self) -> dict[str, Any]:
+    def _geometry(self, device: Any, precision: Precision) -> dict[str, Any]:
         return {"point": self.point, "normal": self.normal}
 
     def shapes(self) -> list[dict[str, Any]]:
@@ -170,7 +170,7 @@ class BoxBoundary(Boundary):
     def facing(self, precision: Precision, params: Any) -> wp.Function:
         return walls.box_facing(precision, params)
 
-    def _geometry(self) -> dict[str, Any]:
+    def _geometry(self, device: Any, precision: Precision) -> dict[str, Any]:
         return {"lower": self.lower, "upper": self.upper}
 
     def shapes(self) -> list[dict[str, Any]]:
@@ -250,7 +250,7 @@ class SphereBoundary(Boundary):
     def facing(self, precision: Precision, params: Any) -> wp.Function:
         return walls.sphere_facing(precision, params)
 
-    def _geometry(self) -> dict[str, Any]:
+    def _geometry(self, device: Any, precision: Precision) -> dict[str, Any]:
         return {"center": self.center, "radius": self.radius, "inside": int(self.inside)}
 
     def shapes(self) -> list[dict[str, Any]]:

@@ -15,10 +15,10 @@ from ..engine.model import Model
 from ..engine.neighbors.lists import Neighbors
 from ..engine.state import State
 from ..kernels.constraints import boundary as kernels
-from ..kernels.constraints.boundary_bounce import bounce_kernel, start_bounce_kernel
+from ..kernels.constraints.boundaries.bounce import bounce_kernel, start_bounce_kernel
+from ..kernels.constraints.boundaries.meeting import Form, held_type
 from ..kernels.constraints.rigid_motion import motion_type, pose_kernel, pose_type
 from ..kernels.precision import Precision
-from ..scene.part import Part
 from ..scene.wall import Wall
 from .easing import EasedConstraint
 from .tuples import bodies
@@ -31,6 +31,7 @@ class Holding(EasedConstraint):
     rank = 2
     solid = True
     sides = 1  # at most how many of them a particle touches at once
+    tracked = False  # its surface looks at the way of a substep
     slip: bool
     places: tuple[int, ...] = (0,)  # see Wall
 
@@ -48,12 +49,13 @@ class Holding(EasedConstraint):
             peer._check(model, w)
         members = model.members([peer.group for peer in self.peers], self.name)
         self.count, self.members = len(members), members
-        self.held = kernels.held_type(model.precision, self.sides)()
+        self.held = held_type(model.precision, self.sides)()
         self.held.particle = model.array(members, wp.int32)
         self.worlds_held = model.world_of[members]
         self.held.world = model.array(self.worlds_held, wp.int32)
-        columns = self._columns(["friction", "restitution"])
-        model.fits(self.name, columns)
+        columns = self._columns(model, ["friction", "restitution"])
+        numbers = {name: each for name, each in columns.items() if isinstance(each, np.ndarray)}
+        model.fits(self.name, numbers)
         radii = model.column("radius")[members]
         model.squares_fit(self.name, "radius", np.concatenate([radii, model.apart()[0]]))
         self.Params, self.params = model.parameters(f"{type(self).__name__}Parameters", columns)
@@ -62,18 +64,25 @@ class Holding(EasedConstraint):
         if self.moving:
             self.requires = self.requires | {"time"}
 
-    def _columns(self, names: Sequence[str]) -> dict[str, np.ndarray]:
+    def _columns(self, model: Model, names: Sequence[str]) -> dict[str, Any]:
         """What the surface takes, and these values of the boundary, in every world."""
         rows = [
-            {**peer._geometry(), **{name: getattr(peer, name) for name in names}}
+            {
+                **peer._geometry(model.device, model.precision),
+                **{name: getattr(peer, name) for name in names},
+            }
             for peer in self.peers
         ]
-        return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        columns = {name: [row[name] for row in rows] for name in rows[0]}
+        return {
+            name: column if isinstance(column[0], wp.array) else np.array(column)
+            for name, column in columns.items()
+        }
 
     def wall(self, model: Model, state: State) -> Wall:
         """What it is to a continuum."""
         name, precision = type(self).__name__, model.precision
-        Params, params = model.parameters(f"{name}Wall", self._columns(["friction"]))
+        Params, params = model.parameters(f"{name}Wall", self._columns(model, ["friction"]))
         pose, follow = self._posed(model, state)
         facing = self.facing(precision, Params)
         own = self.name, self.peers, self.places, not self.slip
@@ -89,14 +98,17 @@ class Holding(EasedConstraint):
         self.held.radius = state.radius
         self.held.slack, self.held.marked = self.easing.slack, self.easing.marked
         self.held.pressed = wp.zeros(self.count, dtype=precision.vec3, device=device)
+        if self.tracked:
+            count = model.particle_count
+            self.held.start = wp.zeros(count, dtype=precision.vec3, device=device)
         if self.rough:
             self.held.grip = wp.zeros(self.count, dtype=each, device=device)
         self.held.pose, self.follow = self._posed(model, state)
         forces = "force" in state
         self.force = state.force if forces else wp.empty(0, dtype=precision.vec3, device=device)
-        self.form = kernels.Form(
+        self.form = Form(
             self.surface(precision), self.sides, precision, self.Params, "position_error" in state,
-            self.moving,
+            self.moving, self.tracked,
         )  # fmt: skip
         self.begin_kernel = kernels.begin_kernel(self.form)
         self.project_kernel = kernels.project_kernel(self.form)
@@ -132,7 +144,10 @@ class Holding(EasedConstraint):
         return self.model.unresolved_radii(self.name, self.members)
 
     def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
-        return self.worlds_held if name == "slack" else super().worlds(name, array)
+        return self.worlds_held if name in ("slack", "pressed") else super().worlds(name, array)
+
+    def readable(self) -> dict[str, wp.array]:
+        return {"pressed": self.held.pressed} if self.count else {}
 
     def _launch(self, kernel: wp.Kernel, *inputs: Any) -> None:
         everything = [self.params, self.held, self.bodies, *inputs]
@@ -165,13 +180,10 @@ class Holding(EasedConstraint):
         if self.bounces:
             self._launch(self.bounce_kernel, bounces, dt, 1.0 / dt)
 
-    def read_force(self, part: Part) -> np.ndarray:
-        """What particles exert that touch it, -sum m dx / dt^2 of the last substep, (worlds, 3)."""
-        model, found = self.model, np.zeros((len(self.peers), 3))
-        if self.count:
-            mass = model.column("mass")[self.members]
-            way = self.held.pressed.numpy().astype(np.float64) * mass[:, None]
-            for axis in range(3):
-                sums = np.bincount(self.worlds_held, way[:, axis], len(found))
-                found[:, axis] = -sums / model.settings.substep**2
-        return found[[part is self or part is peer for peer in self.peers]]
+    def exerted(self) -> tuple[np.ndarray, np.ndarray]:
+        """What particles exert that touch it, -m dx / dt^2 of the last substep, by row, (k, 3)."""
+        if not self.count:
+            return self.members, np.zeros((0, 3))
+        mass = self.model.column("mass")[self.members]
+        way = self.held.pressed.numpy().astype(np.float64)
+        return self.members, -way * mass[:, None] / self.model.settings.substep**2

@@ -11,6 +11,7 @@ import warp as wp
 
 from .. import validate
 from ..kernels.engine.loops import Periodicity, box_type
+from ..kernels.parameters import in_memory, parameter_types
 from ..kernels.precision import PRECISIONS, structure
 from ..kernels.self_check import fast_ways
 from ..scene import ranges
@@ -164,7 +165,7 @@ class Model:
         kind = self.precision.vector(9)
         return wp.array(ptr=boxes.ptr, shape=len(boxes), dtype=kind, device=self.device)
 
-    def structures(self, kind: Any, columns: dict[str, np.ndarray]) -> wp.array:
+    def structures(self, kind: Any, columns: Mapping[str, Any]) -> wp.array:
         """An array of ``wp.struct`` from one host column a field."""
         count = len(next(iter(columns.values())))
         host = np.zeros(count, dtype=kind.numpy_dtype())
@@ -219,19 +220,18 @@ class Model:
         size = np.array([float(np.ptp(each, axis=0).max()) if len(each) else 0.0 for each in x])
         return size, size / np.maximum(np.diff(self.offsets), 1) ** (1.0 / 3.0)
 
-    def parameters(self, name: str, columns: dict[str, np.ndarray]) -> tuple[Any, wp.array]:
+    def parameters(self, name: str, columns: Mapping[str, Any]) -> tuple[Any, wp.array]:
         """A parameter struct and its array, one entry a world or an item.
 
-        Columns are (count,) numbers, whole if they are integers, or (count, 3) vectors.
+        Columns are (count,) numbers, whole if they are integers, (count, 3) vectors, or an array of
+        the device each, which whoever gives it keeps.
         """
-        precision = self.precision
-        kinds = {
-            key: wp.int32 if np.issubdtype(column.dtype, np.integer)
-            else precision.vec3 if np.ndim(column) == 2 else precision.scalar
+        first = {
+            key: column[0] if len(column) else np.zeros(np.shape(column)[1:], column.dtype)
             for key, column in columns.items()
-        }  # fmt: skip
-        kind = structure(name, kinds)
-        return kind, self.structures(kind, columns)
+        }
+        kind = structure(name, parameter_types(first, self.precision))
+        return kind, self.structures(kind, {key: in_memory(columns[key]) for key in columns})
 
     def array(self, values: Any, dtype: Any) -> wp.array:
         """A device array of host values."""

@@ -200,7 +200,7 @@ class Interaction(Part):
         return []
 
     def presses(self, wall: Part) -> Any:
-        """What it exerts on a solid constraint by itself, (worlds, 3); None: nothing."""
+        """What it exerts on a solid constraint by itself: rows, forces (k, 3); None: nothing."""
 
     def follow(self, state: Any, damps: bool) -> None:
         """Add (df/dv) u, by which the force differs where the velocity is u ahead.

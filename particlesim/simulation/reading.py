@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from .. import validate
 from ..engine.frames import Frames
 from ..engine.integrators.integrator import Integrator
 from ..engine.limit import Limit
@@ -20,6 +21,7 @@ from ..instruments.diagnostics import Diagnostics, measure
 from ..instruments.explain import Explanation, explain
 from ..instruments.ledger.accounts import Accounts
 from ..instruments.ledger.ledger import Ledger, read
+from ..instruments.loads import force_on, torque_on
 from ..instruments.stability import Stability, stability
 from ..instruments.watchdog.incident import Incident
 from ..instruments.watchdog.watch import Watchdog
@@ -139,18 +141,38 @@ class Reading(Access):
             ValueError: It is no part of this simulation, or neither of these.
         """
         bound = self.loop.bound("Simulation.force", constraint)
-        found = bound.read_force(constraint)
         if not bound.solid:
-            return found
-        chosen = [constraint is bound or constraint is peer for peer in bound.peers]
-        nothing = Interaction.presses
-        fluids = [each for each in self.interactions if type(each).presses is not nothing]
-        if fluids:
-            self.loop.know_forces()
-        for pressed in (each.presses(bound) for each in fluids):
-            if pressed is not None:
-                found = found + pressed[chosen]
-        return found[0] if len(found) == 1 else found
+            return bound.read_force(constraint)
+        return self._of(constraint, bound, force_on(self.loop, bound))
+
+    def torque(self, boundary: ConstraintBase) -> np.ndarray:
+        """Torque on a boundary about where its pivot is, of the last substep [force * length].
+
+        That of the forces that :meth:`force` sums, each at the middle of the particle: what the
+        boundary gains of angular momentum is what the particles lose. The pivot is what it turns
+        about: that of a plane its point, of a box, sphere, capsule or cylinder the middle (of an
+        open box the origin), of others their ``pivot``.
+
+        Args:
+            boundary: Of the scene, or one of :attr:`constraints`.
+
+        Returns:
+            (3,), or (worlds, 3) where it stands for several.
+
+        Raises:
+            ValueError: It is no boundary of this simulation; a periodic scene.
+        """
+        bound = self.loop.bound("Simulation.torque", boundary)
+        if not bound.solid:
+            raise validate.fail(
+                "Simulation.torque", "boundary", "be a boundary", bound.name, "name a Boundary"
+            )
+        return self._of(boundary, bound, torque_on(self.loop, bound))
+
+    def _of(self, part: ConstraintBase, bound: ConstraintBase, found: np.ndarray) -> np.ndarray:
+        """The rows of the worlds whose part this is."""
+        chosen = found[[part is bound or part is peer for peer in bound.peers]]
+        return chosen[0] if len(chosen) == 1 else chosen
 
     def broken(self, constraint: ConstraintBase) -> np.ndarray:
         """Which tuples of a constraint have broken, (m,) bool, like :meth:`force`."""

@@ -74,6 +74,10 @@ QUANTITIES = {
     "linear": Quantity(0.3, (0, 1, -1)),
     "quadratic": Quantity(0.2, (-1, 1, 0)),
     "flow": Quantity((0.5, 0.1, -0.2), (1, 0, -1), "velocity"),
+    "start": Quantity((-1.6, -1.8, 0), (1, 0, 0), "point"),
+    "end": Quantity((1.7, -1.5, 0.2), (1, 0, 0), "point"),
+    ("CapsuleBoundary", "radius"): Quantity(1.3, (1, 0, 0)),
+    ("CylinderBoundary", "radius"): Quantity(1.3, (1, 0, 0)),
     "compliance": Quantity(0.05, (0, -1, 2)),
     "friction": Quantity(0.3),
     "restitution": Quantity(0.5),
@@ -125,14 +129,16 @@ LAWS = {
 PLAIN = {**TUPLES, "group": None, "exponents": (12, 6)}
 LEFT_OUT = {"break_force", "inequality", "tension_only", "truncation", "inside", "potential",
             "smoothing", "density", "dimension", "viscosity", "pivot", "drawn", "mixing", "groups",
-            "exclude", "switch", "method", "tolerance", "slip", ("Electrostatics", "cutoff"),
-            ("Electrostatics", "damping"), ("Gravity", "cutoff")}  # fmt: skip
+            "exclude", "switch", "method", "tolerance", "slip", "capped",
+            ("Electrostatics", "cutoff"), ("Electrostatics", "damping"),
+            ("Gravity", "cutoff")}  # fmt: skip
 # What is of one machinery is tried by its kin in every run, and itself in the long one.
 KIN = {
     "ElasticSolid": "Springs",
     "HarmonicBonds": "Springs", "FENEBonds": "Bonds", "HarmonicAngles": "Angles",
     "Mie": "LennardJones", "Yukawa": "PairPotential", "Morse": "PairPotential",
     "DFSPH": "SPH",
+    "CapsuleBoundary": "CylinderBoundary",
     "SoftSphere": "PairPotential", "Coulomb": "PairPotential", "Electrostatics": "PairPotential",
 }  # fmt: skip
 # To a grid, which rests in the frame that it is made in, and to groups of several fluids.

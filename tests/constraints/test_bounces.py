@@ -93,7 +93,7 @@ def test_a_tilted_rod_keeps_its_energy(tilt, device):
     x = ROD @ np.array(
         [(np.cos(tilt), np.sin(tilt), 0), (-np.sin(tilt), np.cos(tilt), 0), (0, 0, 1)]
     )
-    scene.add_particles(x + (0, 0.5, 0), radius=0.05, velocity=(0, -2, 0))
+    scene.add_particles(x + np.array([0, 0.5, 0]), radius=0.05, velocity=(0, -2, 0))
     scene.add_constraint(ps.Distance([(0, 1)]))
     scene.add_constraint(ps.PlaneBoundary((0, 0, 0), (0, 1, 0), restitution=1.0))
     sim = ps.Simulation(scene, ps.Settings(dt=1 / 60, substeps=20), device=device)

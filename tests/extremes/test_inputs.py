@@ -45,6 +45,7 @@ PARTS = {
         "level": 0.0,
     },
     ps.BoxBoundary: {"lower": (0, 0, 0), "upper": (1, 1, 1), "friction": 0.1, "restitution": 0.5},
+    ps.CapsuleBoundary: {"start": (0, 0, 0), "end": (1, 0, 0), "radius": 0.2, "friction": 0.1},
     ps.CellRescaling: {"pressure": 1.0, "compressibility": 1.0, "relaxation_time": 1.0,
                        "temperature": 1.0, "interval": 5},
     ps.ConstantForce: {"force": (0, 1, 0)},
@@ -67,6 +68,7 @@ PARTS = {
     ps.FENEBonds: {"pairs": [(0, 1)], "stiffness": 30.0, "length": 1.5},
     ps.Gravity: {"G": 1.0, "softening": 0.1, "method": "particle_mesh_ewald", "cutoff": 2.0,
                  "tolerance": 1e-5},
+    ps.CylinderBoundary: {"start": (0, 0, 0), "end": (1, 0, 0), "radius": 0.2},
     ps.DFSPH: {"smoothing_length": 0.1, "rest_density": 1.0},
     ps.HarmonicAngles: {"triples": [(0, 1, 2)], "stiffness": 1.0, "rest_angle": 2.0},
     ps.HarmonicBonds: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0},
@@ -103,7 +105,7 @@ NEVER = {
     (ps.Distance, "break_force"),
 }  # may be infinite: unbreakable
 INDICES = {"pairs", "triples", "quadruples", "particles"}
-SIGNED = {"velocity", "angular_velocity", "pivot", "drawn",
+SIGNED = {"start", "end", "velocity", "angular_velocity", "pivot", "drawn",
           "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
           "periodic", "G", "pressure"}  # fmt: skip
 

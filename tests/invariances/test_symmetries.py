@@ -18,8 +18,9 @@ HOLDING = [name for name in kinds() if name not in FORCES]
 # Their kin goes together with all others for those of the same machinery, too.
 APART = [name for name in FORCES if name not in KIN]
 # What knows a place, a direction or a medium of its own takes up momentum.
-EXTERNAL = {"BoxBoundary", "PlaneBoundary", "SphereBoundary", "Boundary", "ConstantForce", "Drag",
-            "ParticleForce", "UniformGravity"}  # fmt: skip
+EXTERNAL = {"ConstantForce", "Drag", "ParticleForce", "UniformGravity"} | {
+    name for name in kinds() if name.endswith("Boundary")
+}
 
 
 def run(described, frames=8, settings=SETTINGS, each_frame=lambda sim: None):

@@ -156,7 +156,7 @@ class Evolving(Interaction):
         if self.walls:
             self.walls.easing.mark(worlds)
 
-    def presses(self, wall: Part) -> np.ndarray | None:
+    def presses(self, wall: Part) -> tuple[np.ndarray, np.ndarray] | None:
         return self.walls.pressed(wall) if self.walls else None
 
     def fluid_numbers(self) -> np.ndarray:

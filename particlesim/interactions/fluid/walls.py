@@ -205,8 +205,10 @@ class Walls:
         ]
         self.sum(plain, *beside)
 
-    def pressed(self, part: Part) -> np.ndarray | None:
-        """What the fluid exerts on a boundary, (worlds, 3), at the last densities; None: nothing.
+    def pressed(self, part: Part) -> tuple[np.ndarray, np.ndarray] | None:
+        """What the fluid exerts on a boundary, at the last densities; None: nothing.
+
+        Rows of its particles, and forces, (k, 3).
 
         To each of several walls the part along its normal, and what drags along them to the first
         to which it sticks.
@@ -221,9 +223,7 @@ class Walls:
             store = functools.partial(presses.keep_press, own, places, self.total)
             pressed = pairs.array(self.model.precision.vec3)
             self.loop.sum(term, store, {"pressed": pressed, "normal": self.normal})
-            force = pressed.numpy().astype(np.float64)
-            edges = zip(pairs.begin_host, pairs.end_host, strict=True)
-            return -np.stack([force[begin:end].sum(axis=0) for begin, end in edges])
+            return pairs.order.numpy(), -pressed.numpy().astype(np.float64)
         return None
 
     def sum(self, plain: Pass, *beside: Pass) -> None:

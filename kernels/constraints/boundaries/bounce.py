@@ -4,10 +4,11 @@ import functools
 
 import warp as wp
 
-from ..engine.bounces import ENOUGH, bounces_type
-from ..precision import register
-from .boundary import Form, friction_function, held_type, meeting_function, velocity_function
-from .constraints import bodies_type, rounding_function
+from ...engine.bounces import ENOUGH, bounces_type
+from ...precision import register
+from ..boundary import friction_function
+from ..constraints import bodies_type, rounding_function
+from .meeting import Form, held_type, meeting_function, velocity_function
 
 RESTING = (
     1.0e-3  # of the speed that the projection has taken: what comes slower is pressed, not hit

@@ -1,0 +1,61 @@
+"""Surfaces about an axis: capsules and cylinders."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from ...precision import Precision, function
+
+
+@functools.cache
+def capsule_near(precision: Precision, params: Any) -> wp.Function:
+    """The distance from a segment, less the radius."""
+    vec3, real = precision.vec3, precision.scalar
+
+    def near_capsule(x: vec3, e: vec3, R: real, s: vec3, p: params):
+        y = x - p.center + e
+        y = y - p.axis * wp.clamp(wp.dot(y, p.axis), -p.half, p.half)
+        r = wp.length(y)
+        n = p.aside  # of the segment: any direction across it will do
+        if r > real(0.0):
+            n = y / r
+        d = r - p.radius
+        if p.inside != 0:
+            n = -n
+            d = -d
+        return d, n
+
+    return function(near_capsule)
+
+
+@functools.cache
+def cylinder_near(precision: Precision, params: Any) -> wp.Function:
+    """The distance from a cylinder, with its edges; of infinite half length from one without."""
+    vec3, real = precision.vec3, precision.scalar
+
+    def near_cylinder(x: vec3, e: vec3, R: real, s: vec3, p: params):
+        y = x - p.center + e
+        along = wp.dot(y, p.axis)
+        across = y - p.axis * along
+        r = wp.length(across)
+        out = p.aside  # of the axis: any direction across it will do
+        if r > real(0.0):
+            out = across / r
+        cap = p.axis * wp.where(along < real(0.0), real(-1.0), real(1.0))
+        d = r - p.radius
+        n = out
+        beyond = wp.abs(along) - p.half
+        if d > real(0.0) and beyond > real(0.0):
+            y = out * d + cap * beyond
+            d = wp.length(y)
+            n = y / d
+        elif beyond > d:
+            d = beyond
+            n = cap
+        if p.inside != 0:
+            n = -n
+            d = -d
+        return d, n
+
+    return function(near_cylinder)
