@@ -5,10 +5,35 @@ import functools
 import warp as wp
 
 from ..precision import function
-from .constraints import Solved, positions_type, seen_function
+from .constraints import Solved, bodies_type, positions_type, seen_function
 
 TURNED = 0.5  # of the gradient: what is left of it along that at the start of the substep
 SHIFTED = 0.5  # parts of a tuple's extent that it may shift its particles by, in a substep
+
+
+@functools.cache
+def load_function(law: Solved) -> wp.Function:
+    """``load(ids, b) -> (x, e, c, v, w)``: what the state has of a tuple's particles."""
+    size, compensated, Bodies = law.size, law.compensated, bodies_type(law.precision)
+    positions, weights = positions_type(law.precision, size), law.precision.vector(size)
+    indices = wp.types.vector(length=size, dtype=wp.int32)
+
+    def load(ids: indices, b: Bodies):
+        x = positions()
+        e = positions()
+        c = positions()
+        v = positions()
+        w = weights()
+        for a in range(wp.static(size)):
+            x[a] = b.x[ids[a]]
+            w[a] = b.w[ids[a]]
+            c[a] = b.correction[ids[a]]
+            v[a] = b.v[ids[a]]
+            if wp.static(compensated):
+                e[a] = b.x_error[ids[a]]
+        return x, e, c, v, w
+
+    return function(load)
 
 
 @functools.cache

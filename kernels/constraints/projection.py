@@ -11,8 +11,8 @@ import functools
 import warp as wp
 
 from ..precision import function, register
-from .constraints import Solved, place_function, positions_type
-from .correction import evaluate_function, multiply_function
+from .constraints import Solved, place_function
+from .correction import evaluate_function, load_function, multiply_function
 from .native_sweep import group, native_sweep
 
 BLOCK = 64  # tuples that a thread of the CPU sweeps
@@ -24,11 +24,9 @@ def plain_sweep(law: Solved) -> wp.Function:
     In Warp's own language. ``fresh``: multipliers start from 0, whatever they were.
     """
     real, Box, Tuples, Bodies = law.types
-    size, evaluate, multiply = law.size, evaluate_function(law), multiply_function(law)
-    positions, weights = positions_type(law.precision, law.size), law.precision.vector(law.size)
+    load, evaluate, multiply = load_function(law), evaluate_function(law), multiply_function(law)
     place = place_function(law.precision, law.compensated)
-    wraps, compensated = bool(law.periodic), law.compensated
-    breakable = law.breakable
+    size, wraps, breakable = law.size, bool(law.periodic), law.breakable
 
     def sweep_plainly(
         first: int, last: int, fresh: int, box: wp.array(dtype=Box), t: Tuples, b: Bodies,
@@ -42,18 +40,7 @@ def plain_sweep(law: Solved) -> wp.Function:
                     continue
             ids = t.particle[r]
             q = t.item[r]
-            x = positions()
-            e = positions()
-            c = positions()
-            v = positions()
-            w = weights()
-            for a in range(wp.static(size)):
-                x[a] = b.x[ids[a]]
-                w[a] = b.w[ids[a]]
-                if wp.static(compensated):
-                    e[a] = b.x_error[ids[a]]
-                c[a] = b.correction[ids[a]]
-                v[a] = b.v[ids[a]]
+            x, e, c, v, w = load(ids, b)
             B = Box()
             if wp.static(wraps):
                 B = box[t.world[r]]

@@ -19,11 +19,11 @@ from ..engine.probe import Probe
 from ..engine.state import State
 from ..kernels.constraints import constraints as kernels
 from ..kernels.constraints.constraint_force import virial_kernel
-from ..kernels.constraints.projection import BLOCK, project_kernel
 from ..scene.law import law as make_law
 from .force import ConstraintForce
 from .limits import constraint_limits
 from .reading import ReadTuples
+from .solvers import SOLVERS
 from .tuples import Tuples, bodies
 from .velocities import TupleVelocities
 
@@ -42,9 +42,9 @@ class Constraint(ReadTuples):
     angular momentum exactly; where that has turned too far, or pulls so hard that a substep does
     not resolve how the tuple swings, that where the particles are, which is stable at any step.
     Damping follows as an impulse on the velocities, implicit in them, so that what rests does not
-    know of it. Tuples are solved one after the other (Gauss-Seidel), those that share no particle
-    at once. The result is that of a spring of stiffness 1/alpha with a damper beta, however many
-    iterations are made.
+    know of it. Tuples are solved one after the other, those that share no particle at once, or all
+    at once (``Settings.solver``). The result is that of a spring of stiffness 1/alpha with a
+    damper beta, however many iterations are made.
 
     Write C as a length or an angle rather than a square of it: a step follows the tangent of C,
     and is as good as the tangent. Tuples whose gradient vanishes, and those with all particles
@@ -206,8 +206,7 @@ class Constraint(ReadTuples):
         self.fresh = False  # whether the multipliers are yet to be made anew in this substep
         self.strain = wp.zeros_like(self.struct.lam)
         solved = self.tuples.solved(self, state)
-        self.project_kernel = project_kernel(solved, model.vectorised)
-        self.block = BLOCK if model.vectorised else 1
+        self.solver = SOLVERS[model.settings.solver](self, solved)
         self.velocities = TupleVelocities(self, solved)
         self.strain_kernel = kernels.strain_kernel(solved)
         self.virial_kernel = virial_kernel(solved)
@@ -223,9 +222,7 @@ class Constraint(ReadTuples):
         own = 0.0 if math.isinf(dt) else dt
         scale = 1.0 / dt * (1.0 / dt) if self.fresh else -1.0
         self.fresh = False
-        for start, end in self.tuples.spans:
-            inputs = [start, end, scale, self.model.box, self.struct, self.bodies, own, 1.0 / dt]
-            launch(self.project_kernel, end - start, inputs, self.model.device, self.block)
+        self.solver.sweep(scale, own, 1.0 / dt)
 
     def start_bounce(self, state: State, neighbors: Neighbors, bounces: Any, dt: float) -> None:
         if self.count:

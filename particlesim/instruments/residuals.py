@@ -15,7 +15,7 @@ from ..engine.execution.launch import launch
 from ..engine.source import Source
 from ..kernels.instruments import residual as kernels
 
-UNMET = 0.02  # of a tuple's extent: what it may be off by
+UNMET = 0.01  # of a tuple's extent: what it may be off by
 
 
 def residuals(constraint: Any, sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
@@ -44,6 +44,16 @@ def off(constraint: Constraint, sim: Source) -> tuple[np.ndarray, np.ndarray] | 
     kernel = kernels.off_kernel(constraint.tuples.solved(constraint, sim.state))
     inputs = [sim.model.box, constraint.struct, constraint.bodies]
     return _run(kernel, constraint.count, inputs, sim), constraint.tuples.world
+
+
+def worst(sim: Source) -> np.ndarray:
+    """The largest :func:`off` of all tuples of each world, (worlds,); not a number without any."""
+    found = np.full(sim.model.world_count, np.nan)
+    for constraint in sim.constraints:
+        missed = off(constraint, sim) if isinstance(constraint, Constraint) else None
+        if missed is not None:
+            np.fmax.at(found, missed[1], missed[0])
+    return found
 
 
 @functools.singledispatch

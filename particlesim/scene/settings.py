@@ -10,6 +10,7 @@ from .. import validate
 
 INTEGRATORS = ("symplectic_euler", "velocity_verlet", "yoshida4", "yoshida6")
 PRECISIONS = ("float32", "float64")
+SOLVERS = ("gauss_seidel", "jacobi")
 EXECUTIONS = ("auto", "graph", "threads")
 ON_FAILURE = ("stop", "retry", "freeze")
 AUTO = "auto"  # a dt or substeps that a simulation chooses when it is made
@@ -39,6 +40,9 @@ class Settings:
             run that wants more warns of what does. None: with ``"adaptive"`` 10 000.
         iterations: Sweeps over the constraints a substep (XPBD). Compliant constraints do not
             depend on it; stiff ones come closer to C = 0.
+        solver: How a sweep goes over the tuples of a constraint. ``"gauss_seidel"``: colour by
+            colour, each from where the last one has left the particles; ``"jacobi"``: all at once,
+            each particle split among its tuples: some sweeps more, but in no order.
         bounce_iterations: Sweeps over velocities in a substep in which something bounces off, at
             most; a rigid body of many particles takes some tens of them (see ``Contact``).
         integrator: ``"symplectic_euler"`` (first order, any scene); ``"velocity_verlet"`` (second
@@ -93,6 +97,7 @@ class Settings:
     substeps: int | Any = 10  # or AUTO or ADAPTIVE
     most_substeps: int | None = None
     iterations: int = 1
+    solver: str = "gauss_seidel"
     bounce_iterations: int = 200
     integrator: str | type = "symplectic_euler"
     precision: str = "float32"
@@ -141,6 +146,7 @@ class Settings:
         if not isinstance(self.integrator, type):
             validate.choice(owner, "integrator", self.integrator, INTEGRATORS)
         validate.choice(owner, "precision", self.precision, PRECISIONS)
+        validate.choice(owner, "solver", self.solver, SOLVERS)
         validate.choice(owner, "execution", self.execution, EXECUTIONS)
         validate.choice(owner, "on_failure", self.on_failure, ON_FAILURE)
         if self.skin is not None:
