@@ -7,9 +7,14 @@ from .accuracy.tradeoff.sweep import tradeoff
 from .accuracy.tradeoff.table import Tradeoff
 from .accuracy.tune.report import Tuned
 from .accuracy.tune.tuning import tune
+from .constraints.boundaries.heightfield import HeightfieldBoundary
+from .constraints.boundaries.mesh import MeshBoundary
+from .constraints.boundaries.motion import Keyframes, Trajectory
 from .constraints.boundaries.round import CapsuleBoundary, CylinderBoundary
+from .constraints.boundaries.sampled import SDFBoundary
 from .constraints.boundary import Boundary
 from .constraints.boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
+from .constraints.clusters.shape_matching import ShapeMatching
 from .constraints.constraint import Constraint
 from .constraints.contact import Contact
 from .constraints.distance import Distance
@@ -126,6 +131,7 @@ __all__ = [
     "Group",
     "HarmonicAngles",
     "HarmonicBonds",
+    "HeightfieldBoundary",
     "HertzianGrains",
     "History",
     "IdealGas",
@@ -133,12 +139,14 @@ __all__ = [
     "Integrator",
     "Interaction",
     "Isothermal",
+    "Keyframes",
     "LaminarViscosity",
     "Langevin",
     "Law",
     "Ledger",
     "LennardJones",
     "Measured",
+    "MeshBoundary",
     "Mie",
     "Morse",
     "MuellerViscosity",
@@ -154,8 +162,10 @@ __all__ = [
     "Profile",
     "QuinticSpline",
     "RadialDistribution",
+    "SDFBoundary",
     "Scene",
     "Settings",
+    "ShapeMatching",
     "Simulation",
     "SimulationError",
     "SimulationWarning",
@@ -173,6 +183,7 @@ __all__ = [
     "Tait",
     "Thermostat",
     "Tradeoff",
+    "Trajectory",
     "Tuned",
     "UniformGravity",
     "UsdRecorder",

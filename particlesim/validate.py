@@ -149,6 +149,17 @@ def triangles(owner: str, value: Any, count: int, *, proper: bool = True) -> np.
     return array.astype(np.int64)
 
 
+def grid(owner: str, argument: str, value: Any, axes: int) -> np.ndarray:
+    """``value`` as finite numbers at the nodes of a grid, 2 or more along each of its axes."""
+    result = _array(owner, argument, value).copy()
+    if result.ndim != axes or min(result.shape) < 2:
+        raise fail(
+            owner, argument, f"have {axes} axes of 2 nodes or more", result, "sample a whole grid"
+        )
+    _finite(owner, argument, result)
+    return result
+
+
 def _array(owner: str, argument: str, value: Any) -> np.ndarray:
     if hasattr(value, "numpy"):
         value = value.numpy()

@@ -16,10 +16,11 @@ from ..kernels.constraints import walls
 from ..kernels.precision import FLOAT64, Precision, structure
 from ..scene.law import Law
 from ..scene.law import law as make_law
+from .boundaries.drawing import level_set, nodes
+from .boundaries.motion import Motion
 from .holding import Holding
 
 STILL = (0.0, 0.0, 0.0)
-CELLS = 64  # along the longest side of what is drawn
 PLACES = 4096  # at which a law is asked for its period
 # Arguments of every boundary.
 OWN = frozenset(
@@ -33,6 +34,7 @@ OWN = frozenset(
         "pivot",
         "drawn",
         "slip",
+        "motion",
     }
 )
 
@@ -51,7 +53,8 @@ class Boundary(Holding):
     goes through in one substep is not seen.
 
     A boundary moves as a rigid body from where it is described, by its world's clock: place and
-    turn at time t are exact, however many substeps led there.
+    turn at time t are exact, however many substeps led there. Its velocities are given, or follow
+    from a ``motion``, a path or poses at times.
 
     ``PlaneBoundary``, ``BoxBoundary`` and ``SphereBoundary`` are boundaries whose surface is
     written out, so that they are exact where rounding or a lack of room would tell.
@@ -66,6 +69,7 @@ class Boundary(Holding):
         angular_velocity: About the pivot, (3,) [rad/time].
         pivot: What it turns about, as described, (3,) [length].
         slip: A fluid slips along it; False: a viscous one sticks to it.
+        motion: A ``Trajectory`` or ``Keyframes`` in the place of both velocities.
         drawn: ``(lower, upper)`` corners [length] of the box in which recordings draw the surface,
             as described; None: it is not drawn.
         **parameters: The law's further parameters: a number each, or (3,) where the law takes a
@@ -90,10 +94,10 @@ class Boundary(Holding):
     def __init__(
         self, law: Any, friction: float = 0.0, restitution: float = 0.0, group: Any = None, *,
         velocity: Sequence[float] = STILL, angular_velocity: Sequence[float] = STILL,
-        pivot: Sequence[float] = STILL, slip: bool = True,
+        pivot: Sequence[float] = STILL, slip: bool = True, motion: Motion | None = None,
         drawn: tuple[Sequence[float], Sequence[float]] | None = None, **parameters: Any,
     ):  # fmt: skip
-        self._holds(friction, restitution, group, velocity, angular_velocity, slip)
+        self._holds(friction, restitution, group, velocity, angular_velocity, slip, motion)
         self.pivot = validate.vector(self.name, "pivot", pivot, unit="length")
         self.law = make_law(law)
         self.law.check_derivable(self.name)
@@ -102,10 +106,10 @@ class Boundary(Holding):
 
     def _holds(
         self, friction: float, restitution: float, group: Any, velocity: Sequence[float],
-        angular_velocity: Sequence[float], slip: bool,
+        angular_velocity: Sequence[float], slip: bool, motion: Motion | None,
     ) -> None:  # fmt: skip
         """What boundaries of every surface are made with."""
-        self.group, self.slip = group, bool(slip)
+        self.group, self.slip, self.motion = group, bool(slip), motion
         self.friction = validate.number(self.name, "friction", friction, minimum=0.0)
         self.restitution = validate.number(
             self.name, "restitution", restitution, minimum=0.0, maximum=1.0
@@ -114,6 +118,19 @@ class Boundary(Holding):
         self.angular_velocity = validate.vector(
             self.name, "angular_velocity", angular_velocity, unit="rad/time"
         )
+        if motion is not None and not isinstance(motion, Motion):
+            raise validate.fail(
+                self.name,
+                "motion",
+                "be a Trajectory or Keyframes",
+                motion,
+                "make one, or leave it out",
+            )
+        if motion is not None and (self.velocity.any() or self.angular_velocity.any()):
+            raise validate.fail(
+                self.name, "velocity", "be 0 with a motion, which has velocities of its own",
+                [self.velocity.tolist(), self.angular_velocity.tolist()], "leave it out",
+            )  # fmt: skip
 
     def _values(self, given: dict[str, Any]) -> dict[str, Any]:
         """The law's further parameters."""
@@ -149,7 +166,8 @@ class Boundary(Holding):
 
     def kind(self) -> tuple[Any, ...]:
         given = (self.law.key, tuple(self.parameters)) if "law" in vars(self) else ()
-        return (type(self), self.slip, *given)
+        motion = () if self.motion is None else self.motion.kind()
+        return (type(self), self.slip, *given, *motion)
 
     def distance(self, points: Any) -> np.ndarray:
         """The law at points (n, 3) [length] of the boundary as described, that is at time 0.
@@ -177,7 +195,12 @@ class Boundary(Holding):
     @property
     def moves(self) -> bool:
         """Its surface has a velocity."""
-        return bool(self.velocity.any() or self.angular_velocity.any())
+        given = self.velocity.any() or self.angular_velocity.any()
+        return self.motion is not None or bool(given)
+
+    def drift(self, time: float) -> np.ndarray:
+        """The velocity of its pivot at ``time``, (3,) [length/time]."""
+        return self.velocity if self.motion is None else self.motion.at(time, self._pivot())[2]
 
     def pose(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Where it is: what is at x as described is at R x + T at ``time``.
@@ -189,6 +212,10 @@ class Boundary(Holding):
             T, (3,) [length], and R, (3, 3). What moves the shape in itself, as a plane along
             itself or a sphere about its center, is left out.
         """
+        if self.motion is not None:
+            pivot = self._pivot()
+            way, rotation, _ = self.motion.at(time, pivot)
+            return way + pivot - rotation @ pivot, rotation
         travel, turn = self._carried()
         angle = float(np.linalg.norm(turn)) * time
         rotation = np.eye(3)
@@ -200,25 +227,15 @@ class Boundary(Holding):
 
     def shapes(self) -> list[dict[str, Any]]:
         """Its surface in the box that is drawn, clear where it closes in the particles."""
-        from warp.geometry import IsoSurfaceMarchingCubes
-
         if self._box is None:
             return []
-        lower, upper = self._box
-        nodes = 1 + np.ceil(CELLS * (upper - lower) / (upper - lower).max()).astype(int)
-        axes = [np.linspace(*ends) for ends in zip(lower, upper, nodes, strict=True)]
-        d = self.distance(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3))
-        d = d.reshape(nodes)
-        field = wp.array(d, dtype=wp.float32, device="cpu")
-        points, corners = IsoSurfaceMarchingCubes.extract(field, lower=lower, upper=upper)
-        triangles = corners.numpy().reshape(-1, 3)
-        inside = bool(d[np.ix_([0, -1], [0, -1], [0, -1])].max() < 0)
-        mesh = {"points": points.numpy(), "triangles": triangles, "container": inside}
-        return [self._shape("mesh", **mesh)] if len(triangles) else []
+        places, counts = nodes(*self._box)
+        mesh = level_set(self.distance(places).reshape(counts), *self._box)
+        return [self._shape("mesh", **mesh)] if mesh else []
 
     def _shape(self, kind: str, **parameters: Any) -> dict[str, Any]:
         """A shape for recordings, which ask a moving one for its pose."""
-        moving = any(each.any() for each in self._carried())
+        moving = self.motion is not None or any(each.any() for each in self._carried())
         return {"kind": kind, "moving": moving, **parameters}
 
     def _pivot(self) -> np.ndarray:
@@ -252,7 +269,7 @@ class Boundary(Holding):
             gap = np.abs(self.distance(points + length * np.eye(3)[axis]) - d).max()
             if not gap <= 1e-6 * length[axis]:
                 raise validate.fail(
-                    self.name, f"law {self.law.name}",
+                    self.name, f"law {self.law.name}" if hasattr(self, "law") else "surface",
                     f"be the same one period on, {length[axis]:g} along {'xyz'[axis]} [length]",
                     f"a difference of {gap:g}", "give it that period, or leave the axis open",
                 )  # fmt: skip

@@ -16,6 +16,7 @@ from ..kernels.constraints import boundary_shapes as kernels
 from ..kernels.constraints import walls
 from ..kernels.precision import Precision
 from ..scene.law import law
+from .boundaries.motion import Motion
 from .boundary import STILL, Boundary
 from .limits import crossing_limits
 
@@ -38,6 +39,7 @@ class PlaneBoundary(Boundary):
             conveyor belt, which stays where it is.
         angular_velocity: About the point, (3,) [rad/time]: along the normal a turntable.
         slip: A fluid slips along it; False: a viscous one sticks to it.
+        motion: A ``Trajectory`` or ``Keyframes`` in the place of both velocities.
 
     Raises:
         ValueError: Values out of range; a normal along a periodic axis.
@@ -56,9 +58,9 @@ class PlaneBoundary(Boundary):
     def __init__(
         self, point: Sequence[float], normal: Sequence[float], friction: float = 0.0,
         restitution: float = 0.0, group: Any = None, *, velocity: Sequence[float] = STILL,
-        angular_velocity: Sequence[float] = STILL, slip: bool = True,
+        angular_velocity: Sequence[float] = STILL, slip: bool = True, motion: Motion | None = None,
     ):  # fmt: skip
-        self._holds(friction, restitution, group, velocity, angular_velocity, slip)
+        self._holds(friction, restitution, group, velocity, angular_velocity, slip, motion)
         self.point = validate.vector(self.name, "point", point, unit="length")
         given = validate.vector(self.name, "normal", normal)
         longest = np.abs(given).max()
@@ -119,6 +121,7 @@ class BoxBoundary(Boundary):
         velocity: Of the box, (3,) [length/time].
         angular_velocity: About its middle, (3,) [rad/time]; only of a box without open sides.
         slip: A fluid slips along it; False: a viscous one sticks to it.
+        motion: A ``Trajectory`` or ``Keyframes`` in the place of both velocities.
 
     Raises:
         ValueError: Values out of range; a side on a periodic axis; an open box that turns.
@@ -139,9 +142,9 @@ class BoxBoundary(Boundary):
     def __init__(
         self, lower: Sequence[float], upper: Sequence[float], friction: float = 0.0,
         restitution: float = 0.0, group: Any = None, *, velocity: Sequence[float] = STILL,
-        angular_velocity: Sequence[float] = STILL, slip: bool = True,
+        angular_velocity: Sequence[float] = STILL, slip: bool = True, motion: Motion | None = None,
     ):  # fmt: skip
-        self._holds(friction, restitution, group, velocity, angular_velocity, slip)
+        self._holds(friction, restitution, group, velocity, angular_velocity, slip, motion)
         self.lower = self._corner("lower", lower, -np.inf)
         self.upper = self._corner("upper", upper, np.inf)
         if not (self.lower < self.upper).all():
@@ -182,9 +185,8 @@ class BoxBoundary(Boundary):
         return crossing_limits(self, probe, names, lambda box, v: (box.upper - box.lower) / abs(v))
 
     def _pivot(self) -> np.ndarray:
-        # An open box, which does not turn, has no middle.
-        turns = self.angular_velocity.any()
-        return 0.5 * self.lower + 0.5 * self.upper if turns else np.zeros(3)
+        closed = np.isfinite(self.lower).all() and np.isfinite(self.upper).all()
+        return 0.5 * self.lower + 0.5 * self.upper if closed else np.zeros(3)
 
     def _carried(self) -> tuple[np.ndarray, np.ndarray]:
         # Along an axis without sides it moves in itself.
@@ -221,6 +223,7 @@ class SphereBoundary(Boundary):
         velocity: Of the sphere, (3,) [length/time].
         angular_velocity: About the center, (3,) [rad/time].
         slip: A fluid slips along it; False: a viscous one sticks to it.
+        motion: A ``Trajectory`` or ``Keyframes`` in the place of both velocities.
 
     Raises:
         ValueError: Values out of range; a periodic scene.
@@ -237,9 +240,9 @@ class SphereBoundary(Boundary):
     def __init__(
         self, center: Sequence[float], radius: float, inside: bool = True, friction: float = 0.0,
         restitution: float = 0.0, group: Any = None, *, velocity: Sequence[float] = STILL,
-        angular_velocity: Sequence[float] = STILL, slip: bool = True,
+        angular_velocity: Sequence[float] = STILL, slip: bool = True, motion: Motion | None = None,
     ):  # fmt: skip
-        self._holds(friction, restitution, group, velocity, angular_velocity, slip)
+        self._holds(friction, restitution, group, velocity, angular_velocity, slip, motion)
         self.center = validate.vector(self.name, "center", center, unit="length")
         self.radius = validate.number(self.name, "radius", radius, above=0.0, unit="length")
         self.inside = bool(inside)

@@ -93,7 +93,10 @@ class Constraint(ReadTuples):
         count = len(self.particles)
         self.compliance = topology.per_item(self.name, "compliance", compliance, count, minimum=0)
         self.damping = topology.per_item(self.name, "damping", damping, count, minimum=0)
-        self.break_force = self._limit(break_force, count)
+        self.break_force = (
+            None if break_force is None
+            else topology.limits(self.name, "break_force", break_force, count)
+        )  # fmt: skip
         self.parameters = self._values(parameters, size, count)
 
     def _size(self, given: dict[str, Any]) -> int:
@@ -109,17 +112,6 @@ class Constraint(ReadTuples):
                 "write def law(a: wp.vec3, b: wp.vec3, ...)",
             )  # fmt: skip
         return size
-
-    def _limit(self, value: Any, count: int) -> np.ndarray | None:
-        if value is None:
-            return None
-        limit = topology.per_item(self.name, "break_force", value, count, minimum=0)
-        if limit.size and not limit.min() > 0:
-            raise validate.fail(
-                self.name, f"break_force[{int(np.argmin(limit))}]", "be above 0 [force]",
-                float(limit.min()), "leave out what should not be there",
-            )  # fmt: skip
-        return limit
 
     def _values(self, given: dict[str, Any], size: int, count: int) -> dict[str, np.ndarray]:
         names = list(self.law.parameters)[size:]
@@ -234,6 +226,7 @@ class Constraint(ReadTuples):
 
     def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if self.count and dt > 0:
+            self.velocities.straighten(dt)
             self.velocities.damp(dt)
         if self.count and self.break_force is not None:
             self._strain(may_break=True)

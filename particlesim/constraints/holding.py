@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from .. import validate
 from ..engine.easing import Easing
 from ..engine.execution.launch import call, launch
 from ..engine.model import Model
@@ -17,7 +18,9 @@ from ..engine.state import State
 from ..kernels.constraints import boundary as kernels
 from ..kernels.constraints.boundaries.bounce import bounce_kernel, start_bounce_kernel
 from ..kernels.constraints.boundaries.meeting import Form, held_type
+from ..kernels.constraints.boundaries.paths import SHORT
 from ..kernels.constraints.rigid_motion import motion_type, pose_kernel, pose_type
+from ..kernels.parameters import in_memory
 from ..kernels.precision import Precision
 from ..scene.wall import Wall
 from .easing import EasedConstraint
@@ -47,6 +50,10 @@ class Holding(EasedConstraint):
         self.model = model
         for w, peer in enumerate(self.peers):
             peer._check(model, w)
+            if peer.motion is not None and any(model.periodic):
+                raise validate.fail(
+                    self.name, "motion", "be None in a periodic scene", peer.motion, "leave it out"
+                )
         members = model.members([peer.group for peer in self.peers], self.name)
         self.count, self.members = len(members), members
         self.held = held_type(model.precision, self.sides)()
@@ -125,6 +132,8 @@ class Holding(EasedConstraint):
         pose = wp.zeros(count, dtype=pose_type(precision), device=model.device)
         if not moving:
             return pose, lambda: None
+        if self.peers[0].motion is not None:
+            return pose, self._following(model, state, pose)
         carried = [peer._carried() for peer in self.peers]
         columns = {
             "velocity": [peer.velocity for peer in self.peers],
@@ -138,6 +147,17 @@ class Holding(EasedConstraint):
         )
         inputs = [motion, state.time, pose]
         return pose, lambda: launch(pose_kernel(precision), count, inputs, model.device)
+
+    def _following(self, model: Model, state: State, pose: wp.array) -> Callable[[], None]:
+        """What brings the poses to where a motion of its own leads."""
+        instant = model.settings.dt * SHORT
+        given = [peer.motion.struct(model.device, peer._pivot(), instant) for peer in self.peers]
+        Params = given[0][0]
+        columns = {key: in_memory([values[key] for _, values in given]) for key in given[0][1]}
+        motions = model.structures(Params, columns)
+        kernel = self.peers[0].motion.kernel(model.precision, Params)
+        inputs = [motions, state.time, pose]
+        return lambda: launch(kernel, len(pose), inputs, model.device)
 
     def complaint(self) -> str:
         """That places are too coarse for the radii."""

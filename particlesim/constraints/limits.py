@@ -51,7 +51,8 @@ def crossing_limits(
     for w, peer in enumerate(part.peers):
         rows = members[probe.model.world_of[members] == w]
         if len(rows):
-            v = probe.velocity[rows] - peer.velocity
+            time = float(probe.state.time.numpy()[w]) if part.moving else 0.0
+            v = probe.velocity[rows] - peer.drift(time)
             with np.errstate(divide="ignore"):
                 dt = times(peer, v)
             k, which = (int(each) for each in np.unravel_index(np.argmin(dt), dt.shape))

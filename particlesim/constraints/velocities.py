@@ -8,8 +8,9 @@ import warp as wp
 
 from ..engine.execution.copies import zero
 from ..engine.execution.launch import launch
+from ..engine.integrators import method
 from ..kernels.constraints.constraints import Solved
-from ..kernels.constraints.tuple_velocities import bounce_kernel, damp_kernel
+from ..kernels.constraints.tuple_velocities import bounce_kernel, damp_kernel, straighten_kernel
 
 
 class TupleVelocities:
@@ -24,10 +25,16 @@ class TupleVelocities:
         self.constraint, self.model, self.solved = constraint, constraint.model, solved
         self.push: wp.array | None = None  # multipliers of a bounce; made where anything bounces
 
+    def straighten(self, dt: float) -> None:
+        """Where half a kick came since, what is rigid is not on its way to give in to it."""
+        if method(self.model.settings).carries_forces:
+            for _ in range(self.model.settings.iterations):
+                self._sweep(straighten_kernel(self.solved), dt)
+
     def damp(self, dt: float) -> None:
         """f = -beta dC/dt grad C."""
         if self.constraint.tuples.damped:
-            self._sweep(damp_kernel(self.solved), dt, 1.0 / dt)
+            self._sweep(damp_kernel(self.solved), dt)
 
     def start_bounce(self) -> None:
         """No tuple has handed on anything yet."""
@@ -37,7 +44,7 @@ class TupleVelocities:
 
     def bounce(self, bounces: Any, dt: float) -> None:
         """The change of velocities leaves the tuples as they are."""
-        self._sweep(bounce_kernel(self.solved), self.push, bounces, dt, 1.0 / dt)
+        self._sweep(bounce_kernel(self.solved), dt, self.push, bounces, 1.0 / dt)
 
     def _sweep(self, kernel: wp.Kernel, *inputs: Any) -> None:
         it = self.constraint

@@ -98,18 +98,26 @@ class Loop:
         """Advance by ``dt``: interactions, integration, constraints, velocities."""
         self.observers.begin(dt)
         act(self.integrator, self.integrator.begin, dt)
+        if self.integrator.carries_forces:
+            self.hold(dt)
         self._go_on("begin", dt)
+        act(self.integrator, self.integrator.foresee, dt)
         self.forces(dt)
         self.follow(dt)
         act(self.integrator, self.integrator.advance, dt)
         self._go_on("advance", dt)
+        if not self.integrator.carries_forces:
+            self.hold(dt)
+        for constraint in self.swept:
+            inputs = self.state, self.neighbors, dt
+            self.observers.act(constraint, FINISH, constraint.finish, *inputs)
+        self.observers.end(dt)
+
+    def hold(self, dt: float) -> None:
+        """Positions have moved: constraints project them, velocities follow and bounce off."""
         self.constrain(dt, self.settings.iterations)
         act(self.integrator, self.integrator.finish, dt)
-        now = self.state, self.neighbors, dt
-        self.bounces.act(self.observers, *now)
-        for constraint in self.swept:
-            self.observers.act(constraint, FINISH, constraint.finish, *now)
-        self.observers.end(dt)
+        self.bounces.act(self.observers, self.state, self.neighbors, dt)
 
     def _go_on(self, step: str, dt: float) -> None:
         """What interactions have of their own goes on."""
@@ -145,11 +153,7 @@ class Loop:
         self.integrator.settle(dt)
 
     def constrain(self, dt: float, iterations: int) -> None:
-        """Constraints project the positions, one after the other, in each iteration.
-
-        However they were added, what holds bodies together comes first, then what keeps them apart,
-        then boundaries: friction is to see what all others have done.
-        """
+        """Constraints project the positions in turn, by rank: friction sees all others."""
         if not self.swept:
             return
         with owner("pair lists"):
@@ -165,10 +169,10 @@ class Loop:
     def _check_takes(self, moves: type[Integrator]) -> None:
         """Refuse what the integrator cannot move."""
         given, back = self.settings.plain["integrator"], min(moves.stages) < 0
-        if self.constraints and (moves.carries_forces or len(moves.stages) > 1):
+        if self.constraints and len(moves.stages) > 1:
             raise validate.fail(
-                "Settings", "integrator", "be symplectic_euler in a scene with constraints", given,
-                "or leave the constraints out",
+                "Settings", "integrator", "be symplectic_euler or velocity_verlet in a scene with "
+                "constraints", given, "or leave them out",
             )  # fmt: skip
         answers = [part.name for part in self.interactions if part.answers]
         if answers and (moves.carries_forces or len(moves.stages) > 1):
@@ -261,7 +265,7 @@ class Loop:
 
     @property
     def limiter(self) -> Limit | None:
-        """What the number of substeps was chosen by, where it is adaptive."""
+        """What adaptive substeps were chosen by."""
         return self.pacing.limiter
 
     @property

@@ -78,6 +78,17 @@ def per_item(owner: str, argument: str, value: Any, count: int, *, minimum: floa
     return result
 
 
+def limits(owner: str, argument: str, value: Any, count: int) -> np.ndarray:
+    """One force an item beyond which it breaks, above 0."""
+    limit = per_item(owner, argument, value, count, minimum=0)
+    if limit.size and not limit.min() > 0:
+        raise validate.fail(
+            owner, f"{argument}[{int(np.argmin(limit))}]", "be above 0 [force]",
+            float(limit.min()), "leave out what should not be there",
+        )  # fmt: skip
+    return limit
+
+
 def incidence(index: np.ndarray) -> dict[str, np.ndarray]:
     """The tuples of every particle that is in one: row k is that of ``particle[k]``, and holds
     the entries ``begin[k]`` to ``begin[k + 1] - 1`` of ``tuple``, and of ``seat``, its place there.
@@ -129,16 +140,17 @@ def steps(model: Model, w: int, index: np.ndarray) -> np.ndarray:
     return np.linalg.norm(d - length * np.round(wrapped), axis=2)
 
 
-def colors(index: np.ndarray) -> np.ndarray:
-    """A colour for each tuple so that tuples of one colour share no particle (greedy).
+def colors(index: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
+    """A colour for each tuple, of any length, so that those of one colour share no particle
+    (greedy).
 
     Tuples take the lowest colour that none of their particles has yet, in order; worlds do not
     share particles, so a world's colours are what they are alone.
     """
     used: dict[int, int] = {}
     result = np.zeros(len(index), dtype=np.int32)
-    for row, particles in enumerate(index.tolist()):
-        taken = 0
+    for row, each in enumerate(index):
+        particles, taken = each.tolist(), 0
         for particle in particles:
             taken |= used.get(particle, 0)
         free = ~taken & (taken + 1)

@@ -46,9 +46,10 @@ class Settings:
         bounce_iterations: Sweeps over velocities in a substep in which something bounces off, at
             most; a rigid body of many particles takes some tens of them (see ``Contact``).
         integrator: ``"symplectic_euler"`` (first order, any scene); ``"velocity_verlet"`` (second
-            order, scenes without constraints); ``"yoshida4"`` and ``"yoshida6"`` (fourth and sixth
-            order, 3 and 7 evaluations of the forces a substep, with forces of positions alone); or
-            a class of your own derived from :class:`particlesim.Integrator`.
+            order, with rigid constraints too); ``"yoshida4"`` and ``"yoshida6"`` (fourth and sixth
+            order, 3 and 7 evaluations of the forces a substep, with forces of positions alone,
+            without constraints); or a class of your own derived from
+            :class:`particlesim.Integrator`.
         precision: ``"float32"`` or ``"float64"``, in every kernel.
         skin: Added to the cutoff of neighbour lists [length]; they are rebuilt when a particle has
             moved half of it. Changes the cost, not the forces. None: as thick as pays in each

@@ -152,7 +152,33 @@ def constrained(periodic, *, breaks, bounces):
         scene.add_interaction(ps.DFSPH(smoothing_length=1.0, rest_density=1.0))
         scene.add_constraint(ps.PlaneBoundary((0, -9, 0), (0, 1, 0), **touch))
         scene.add_constraint(ps.BoxBoundary((-9, -9, -9), (20, 20, 20), **touch))
-        scene.add_constraint(ps.SphereBoundary((0, 0, 0), 30.0, velocity=(1, 0, 0), **touch))
+        scene.add_constraint(ps.SphereBoundary((0, 0, 0), 30.0, motion=KEYS, **touch))
+    return scene
+
+
+def held():
+    """Inside of boundaries of every further shape."""
+    scene = particles()
+    touch = {"friction": 0.1, "restitution": 0.5}
+    walls = [
+        ps.CapsuleBoundary((0, -50, 0), (0, -50, 5), 30.0, **touch),
+        ps.CylinderBoundary((0, 0, 0), (0, 0, 30), 60.0, True, motion=KEYS, **touch),
+        ps.MeshBoundary([(0, -9, 0), (9, -9, 0), (0, -9, 9)], [(0, 1, 2)], sheet=True,
+                        thickness=0.1, velocity=(1, 0, 0), **touch),
+        ps.SDFBoundary(np.ones((3, 3, 3)), (0, 0, 0), 5.0, **touch),
+        ps.HeightfieldBoundary(np.zeros((3, 3)), (0, -20, 0), 5.0, **touch),
+    ]  # fmt: skip
+    for wall in walls:
+        scene.add_constraint(wall)
+    return scene
+
+
+def clustered():
+    """A small cluster, and one of several chunks; all that they can do."""
+    scene = particles()
+    scene.add_constraint(
+        ps.ShapeMatching([range(6), range(6, 600)], 1.0, yield_strain=0.1, break_force=1.0)
+    )
     return scene
 
 
@@ -162,6 +188,7 @@ def attracted(s, **attributes):
     return scene
 
 
+KEYS = ps.Keyframes([0.0, 1.0], [(0, 0, 0), (0, 0.1, 0)])
 BELT = ps.PlaneBoundary((0, -9, 0), (0, 1, 0), velocity=(1, 0, 0), slip=False)
 BOX, XSPH, VERLET = ((0, 0, 0), (10, 10, 10)), ps.XSPH(), {"integrator": "velocity_verlet"}
 SCENES = {
@@ -188,7 +215,9 @@ SCENES = {
     "heated_fluid": (heated, {}),
     "gas_dynamics": (lambda: heated(smoothing_length=ps.AdaptiveSmoothing()), VERLET),
     "constraints": (lambda: constrained(None, breaks=False, bounces=True), {"ledger": True}),
+    "boundaries": (held, {}),
     "breaking": (lambda: constrained(BOX, breaks=True, bounces=False), {"compensated": False}),
+    "clusters": (clustered, {"compensated": False}),
     "tree": (lambda: attracted(0.1), {"opening_angle": 0.5}),
     "own_softening": (lambda: attracted(None, softening=0.1), {"opening_angle": 0.5}),
     **{name: (lambda name=name: load_scene(name).build(), {}) for name in ready_scenes()},
@@ -196,5 +225,5 @@ SCENES = {
 
 EVERY_KERNEL = (
     "forces", "charged", "damped", "periodic_forces", "fluid", "constraints", "breaking",
-    "gas_dynamics", "star_collision", "tree", "continuity",
+    "gas_dynamics", "star_collision", "tree", "continuity", "clusters",
 )  # fmt: skip

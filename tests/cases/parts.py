@@ -21,6 +21,7 @@ PAIRS = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (6, 7)]
 TUPLES = {
     "pairs": PAIRS, "particles": PAIRS, "triples": [(0, 1, 3), (1, 3, 7), (4, 5, 7), (2, 6, 4)],
     "quadruples": [(0, 1, 3, 7), (5, 4, 6, 2), (0, 2, 6, 7)],
+    "clusters": [(0, 1, 3, 7, 2), (5, 4, 6, 2, 0)],
 }  # fmt: skip
 
 
@@ -76,6 +77,10 @@ QUANTITIES = {
     "flow": Quantity((0.5, 0.1, -0.2), (1, 0, -1), "velocity"),
     "start": Quantity((-1.6, -1.8, 0), (1, 0, 0), "point"),
     "end": Quantity((1.7, -1.5, 0.2), (1, 0, 0), "point"),
+    "vertices": Quantity(
+        [(-4, -1.2, -4), (4, -1.1, -4), (0, -1.3, 5), (0, -5, 0)], (1, 0, 0), "point"
+    ),
+    "thickness": Quantity(0.1, (1, 0, 0)),
     ("CapsuleBoundary", "radius"): Quantity(1.3, (1, 0, 0)),
     ("CylinderBoundary", "radius"): Quantity(1.3, (1, 0, 0)),
     "compliance": Quantity(0.05, (0, -1, 2)),
@@ -126,11 +131,13 @@ LAWS = {
     "Constraint": (separation, ("rest_length",)),
     "Boundary": (bowl, ("middle", "size")),
 }
-PLAIN = {**TUPLES, "group": None, "exponents": (12, 6)}
+TETRAHEDRON = [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)]
+PLAIN = {**TUPLES, "triangles": TETRAHEDRON, "group": None, "exponents": (12, 6)}
 LEFT_OUT = {"break_force", "inequality", "tension_only", "truncation", "inside", "potential",
             "smoothing", "density", "dimension", "viscosity", "pivot", "drawn", "mixing", "groups",
-            "exclude", "switch", "method", "tolerance", "slip", "capped",
-            ("Electrostatics", "cutoff"), ("Electrostatics", "damping"),
+            "exclude", "switch", "method", "tolerance", "slip", "capped", "sheet", "motion", "rest",
+            "yield_strain", "creep", "largest_strain", ("Electrostatics", "cutoff"),
+            ("Electrostatics", "damping"),
             ("Gravity", "cutoff")}  # fmt: skip
 # What is of one machinery is tried by its kin in every run, and itself in the long one.
 KIN = {
@@ -138,11 +145,11 @@ KIN = {
     "HarmonicBonds": "Springs", "FENEBonds": "Bonds", "HarmonicAngles": "Angles",
     "Mie": "LennardJones", "Yukawa": "PairPotential", "Morse": "PairPotential",
     "DFSPH": "SPH",
-    "CapsuleBoundary": "CylinderBoundary",
+    "CapsuleBoundary": "Boundary", "CylinderBoundary": "Boundary", "MeshBoundary": "Boundary",
     "SoftSphere": "PairPotential", "Coulomb": "PairPotential", "Electrostatics": "PairPotential",
 }  # fmt: skip
 # To a grid, which rests in the frame that it is made in, and to groups of several fluids.
-BOUND = ("FieldForce", "SurfaceTension")
+BOUND = ("FieldForce", "SurfaceTension", "HeightfieldBoundary", "SDFBoundary")
 
 
 NU = Quantity(0.1, (2, 0, -1))

@@ -33,6 +33,7 @@ def wave(angle: float, level: float):
     return level * wp.cos(angle)
 
 
+TETRAHEDRON = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
 # Arguments that each part can be made with.
 PARTS = {
     ps.AdaptiveSmoothing: {"eta": 1.2, "largest": 1.0},
@@ -72,12 +73,21 @@ PARTS = {
     ps.DFSPH: {"smoothing_length": 0.1, "rest_density": 1.0},
     ps.HarmonicAngles: {"triples": [(0, 1, 2)], "stiffness": 1.0, "rest_angle": 2.0},
     ps.HarmonicBonds: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0},
+    ps.HeightfieldBoundary: {
+        "heights": [(0, 1), (0, 2)], "lower": (0, 0, 0), "spacing": 0.5, "pivot": (0, 0, 0),
+    },
     ps.IdealGas: {"gamma": 1.4},
     ps.Isothermal: {"sound_speed": 1.0},
+    ps.Keyframes: {"times": [0.0, 1.0], "places": [(0, 0, 0), (0, 1, 0)],
+                   "turns": [(0, 0, 0), (0, 1, 0)]},
     ps.LaminarViscosity: {"kinematic_viscosity": 0.1},
     ps.LennardJones: {"epsilon": 1.0, "sigma": 1.0, "cutoff": 2.5},
     ps.GridField: {"lower": (0, 0, 0), "upper": (1, 1, 1), "spacing": 0.1, "speed": 1.0,
                    "density": 1.0, "damping": 0.1},
+    ps.MeshBoundary: {
+        "vertices": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], "triangles": TETRAHEDRON,
+        "thickness": 0.1,
+    },
     ps.Mie: {"epsilon": 1.0, "sigma": 1.0, "cutoff": 2.5},
     ps.Morse: {"depth": 1.0, "steepness": 1.0, "distance": 1.0, "cutoff": 2.5},
     ps.PairForce: {"law": pull, "cutoff": 1.0, "strength": 1.0},
@@ -86,11 +96,14 @@ PARTS = {
     ps.PlaneBoundary: {"point": (0, 0, 0), "normal": (0, 1, 0), "friction": 0.1},
     ps.PoissonField: {"lower": (0, 0, 0), "upper": (1, 1, 1), "spacing": 0.1},
     ps.Polytrope: {"constant": 1.0, "index": 1.0},
+    ps.SDFBoundary: {"distance": np.ones((2, 2, 3)), "lower": (0, 0, 0), "spacing": 0.5},
     ps.SPH: {"smoothing_length": 0.1, "rest_density": 1.0,
              "equation_of_state": ps.Polytrope(1.0, 1.0)},
     ps.Scene: {"meters_per_unit": 1.0, "periodic": ((0, 0, 0), (1, 1, 1))},
     ps.Settings: {"dt": 0.1, "skin": 0.1, "relaxation": 0.5, "depenetration_speed": 1.0,
                   "opening_angle": 0.5, "substeps": 2, "iterations": 2, "threads": 1},
+    ps.ShapeMatching: {"clusters": [[0, 1, 2]], "compliance": 0.1, "yield_strain": 0.1,
+                       "creep": 1.0, "largest_strain": 0.5, "break_force": 1.0},
     ps.SoftSphere: {"epsilon": 1.0, "sigma": 1.0, "exponent": 2.0},
     ps.Springs: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0, "damping": 0.1},
     ps.SurfaceTension: {"fluid": FLUIDS, "coefficient": 1.0},
@@ -103,11 +116,12 @@ OPEN = {(ps.BoxBoundary, "lower"), (ps.BoxBoundary, "upper")}  # a side may be i
 NEVER = {
     (ps.Constraint, "break_force"),
     (ps.Distance, "break_force"),
+    (ps.ShapeMatching, "break_force"),
 }  # may be infinite: unbreakable
-INDICES = {"pairs", "triples", "quadruples", "particles"}
-SIGNED = {"start", "end", "velocity", "angular_velocity", "pivot", "drawn",
-          "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
-          "periodic", "G", "pressure"}  # fmt: skip
+INDICES = {"clusters", "pairs", "triangles", "triples", "quadruples", "particles"}
+SIGNED = {"velocity", "angular_velocity", "pivot", "drawn", "times", "places", "turns", "start",
+          "end", "vertices", "heights", "level", "strength", "flow", "force", "acceleration",
+          "point", "normal", "lower", "upper", "periodic", "G", "pressure"}  # fmt: skip
 
 
 def numbers_of(part):

@@ -6,6 +6,7 @@ compiled to PTX, of all ready scenes and of others beside. What none of them lau
 
 import ast
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -62,6 +63,9 @@ def simulate(name, precision):
     for constraint in sim.constraints:
         with launch.record(launch.Program()):
             constraint.reset([0])
+            if isinstance(constraint, ps.ShapeMatching):
+                state = SimpleNamespace(bounce_velocity=sim.state.velocity)
+                constraint.bounce(state, sim.neighbors, 0.01)
     return sim
 
 

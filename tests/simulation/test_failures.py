@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 
 import particlesim as ps
-from cases.simulation import Holder, drifting
+from cases.simulation import drifting
 
 # Errors -----------------------------------------------------------------------------------------
 
@@ -103,10 +103,3 @@ def test_other_bad_input(refused):
     for worlds in ([-1], ["a"], 0.5):
         with refused("Simulation.reset: worlds must be a whole number"):
             sim.reset(worlds)
-
-
-def test_constraints_with_velocity_verlet(refused):
-    scene = drifting()
-    scene.add_constraint(Holder("a", []))
-    with refused("Settings: integrator must be symplectic_euler in a scene with constraints"):
-        ps.Simulation(scene, ps.Settings(integrator="velocity_verlet"), device="cpu")

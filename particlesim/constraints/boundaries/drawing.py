@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
+import numpy as np
+import warp as wp
+
+CELLS = 64  # along the longest side of what is drawn
 AROUND = 48  # points of a circle
 
 
@@ -38,3 +42,31 @@ def revolved(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )
     return points, triangles[area > 1e-12 * area.max()]
+
+
+def level_set(d: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> dict[str, Any]:
+    """The surface where a distance on a grid is 0, clear where it closes in the particles.
+
+    Args:
+        d: At the nodes, (n, m, k), positive where particles may be.
+        lower: Where the first node is, (3,).
+        upper: Where the last one is, (3,).
+
+    Returns:
+        ``points``, ``triangles`` and ``container`` of a shape; nothing where there is no surface.
+    """
+    from warp.geometry import IsoSurfaceMarchingCubes
+
+    field = wp.array(d, dtype=wp.float32, device="cpu")
+    points, corners = IsoSurfaceMarchingCubes.extract(field, lower=lower, upper=upper)
+    triangles = corners.numpy().reshape(-1, 3)
+    inside = bool(d[np.ix_([0, -1], [0, -1], [0, -1])].max() < 0)
+    mesh = {"points": points.numpy(), "triangles": triangles, "container": inside}
+    return mesh if len(triangles) else {}
+
+
+def nodes(lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places of a grid between corners, (n, 3), and how many there are along each axis, (3,)."""
+    counts = 1 + np.ceil(CELLS * (upper - lower) / (upper - lower).max()).astype(int)
+    axes = [np.linspace(*ends) for ends in zip(lower, upper, counts, strict=True)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3), counts

@@ -34,9 +34,6 @@ class NearestBoundary(Boundary):
         """How far a particle may go in a substep, so as not to pass it unseen [length]."""
         return np.inf
 
-    def kind(self) -> tuple[Any, ...]:
-        return (type(self), self.slip)
-
     def distance(self, points: Any) -> np.ndarray:
         """The signed distance at points (n, 3) [length] of the boundary as described.
 

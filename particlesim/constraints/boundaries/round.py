@@ -13,6 +13,7 @@ from ...kernels.constraints.boundaries import round as kernels
 from ...kernels.precision import Precision
 from ..boundary import STILL
 from .drawing import revolved
+from .motion import Motion
 from .nearest import NearestBoundary
 
 
@@ -84,6 +85,7 @@ class CapsuleBoundary(RoundBoundary):
         velocity: Of the capsule, (3,) [length/time].
         angular_velocity: About the middle of the segment, (3,) [rad/time].
         slip: A fluid slips along it; False: a viscous one sticks to it.
+        motion: A ``Trajectory`` or ``Keyframes`` in the place of both velocities.
 
     Raises:
         ValueError: Values out of range; ends that coincide; a periodic scene.
@@ -98,9 +100,9 @@ class CapsuleBoundary(RoundBoundary):
         self, start: Sequence[float], end: Sequence[float], radius: float, inside: bool = False,
         friction: float = 0.0, restitution: float = 0.0, group: Any = None, *,
         velocity: Sequence[float] = STILL, angular_velocity: Sequence[float] = STILL,
-        slip: bool = True,
+        slip: bool = True, motion: Motion | None = None,
     ):  # fmt: skip
-        self._holds(friction, restitution, group, velocity, angular_velocity, slip)
+        self._holds(friction, restitution, group, velocity, angular_velocity, slip, motion)
         self._round(start, end, radius, inside)
 
     def near(self, precision: Precision, params: Any) -> wp.Function:
@@ -131,6 +133,7 @@ class CylinderBoundary(RoundBoundary):
         velocity: Of the cylinder, (3,) [length/time].
         angular_velocity: About the middle of its axis, (3,) [rad/time].
         slip: A fluid slips along it; False: a viscous one sticks to it.
+        motion: A ``Trajectory`` or ``Keyframes`` in the place of both velocities.
 
     Raises:
         ValueError: Values out of range; ends that coincide; a periodic scene, but for one that is
@@ -149,9 +152,9 @@ class CylinderBoundary(RoundBoundary):
         self, start: Sequence[float], end: Sequence[float], radius: float, inside: bool = False,
         friction: float = 0.0, restitution: float = 0.0, group: Any = None, *,
         capped: bool = True, velocity: Sequence[float] = STILL,
-        angular_velocity: Sequence[float] = STILL, slip: bool = True,
+        angular_velocity: Sequence[float] = STILL, slip: bool = True, motion: Motion | None = None,
     ):  # fmt: skip
-        self._holds(friction, restitution, group, velocity, angular_velocity, slip)
+        self._holds(friction, restitution, group, velocity, angular_velocity, slip, motion)
         self._round(start, end, radius, inside)
         self.capped = bool(capped)
 

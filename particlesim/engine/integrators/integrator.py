@@ -19,10 +19,10 @@ class Integrator:
     """Moves particles; the base of ready integrators and of your own.
 
     A substep of ``dt`` is ``begin``; the interactions' forces at the positions that it leaves;
-    ``advance``; the constraints; ``finish``. A member says what happens in ``begin`` and
-    ``advance``, made of :meth:`kick`, :meth:`drift` and :meth:`move`; thermostats act in the middle
-    of every drift. Its class is given to the
-    settings, ``Settings(integrator=YourClass)``, and ``model`` and ``state`` are there to be read.
+    ``advance``; the constraints; ``finish``. Constraints come after what moves positions. A member
+    says what happens in ``begin`` and ``advance``, made of :meth:`kick`, :meth:`drift` and
+    :meth:`move`; thermostats act in the middle of every drift. Its class is given to the settings,
+    ``Settings(integrator=YourClass)``, and ``model`` and ``state`` are there to be read.
 
     A method of several evaluations of the forces names its ``stages``: all of that is done once for
     each of them, with the stage's part of ``dt``. They add up to 1. One may be negative: it goes
@@ -37,7 +37,8 @@ class Integrator:
     moves, as where constraints hold it.
 
     ``order`` is that of convergence in ``dt``. ``carries_forces`` says that a substep starts from
-    the forces that the last one ended with; such a method takes no constraints.
+    the forces that the last one ended with: such a method moves in ``begin``, which constraints
+    and ``finish`` then follow.
 
     Example:
         >>> from particlesim import Scene, Settings, Simulation
@@ -121,6 +122,9 @@ class Integrator:
 
     def begin(self, dt: float) -> None:
         """Before the forces."""
+
+    def foresee(self, dt: float) -> None:
+        """Before the forces, when what ``begin`` has moved is where constraints let it be."""
 
     def advance(self, dt: float) -> None:
         """After the forces, which are in ``state.force``."""

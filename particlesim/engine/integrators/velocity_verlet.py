@@ -15,6 +15,9 @@ class VelocityVerlet(Integrator):
     between particles that depend on velocities, as of dampers and viscosity, and those of one's own
     see what the last substep's forces would make of them by its end, v + w f dt, which is of second
     order too (Groot and Warren 1997, eq. 8).
+
+    With rigid constraints it is RATTLE (Andersen 1983), of second order again: positions are
+    projected along gradients at the start of the drift, velocities at its end.
     """
 
     title = "velocity_verlet"
@@ -26,6 +29,8 @@ class VelocityVerlet(Integrator):
 
     def begin(self, dt: float) -> None:
         self.move(0.5 * dt, dt)
+
+    def foresee(self, dt: float) -> None:
         if self.predicted:
             self._launch(self.kernels.foresee, 0.5 * dt)
 

@@ -1,0 +1,1 @@
+"""Kernels of constraints over many particles."""

@@ -1,0 +1,1 @@
+"""Constraints over many particles: shapes that are kept, joints between them, enclosed volumes."""
