@@ -7,6 +7,7 @@ from .accuracy.tradeoff.sweep import tradeoff
 from .accuracy.tradeoff.table import Tradeoff
 from .accuracy.tune.report import Tuned
 from .accuracy.tune.tuning import tune
+from .constraints.bodies.body import Body
 from .constraints.boundaries.heightfield import HeightfieldBoundary
 from .constraints.boundaries.mesh import MeshBoundary
 from .constraints.boundaries.motion import Keyframes, Trajectory
@@ -102,6 +103,7 @@ __all__ = [
     "Angles",
     "ArtificialViscosity",
     "Barostat",
+    "Body",
     "Bonds",
     "Boundary",
     "BoxBoundary",
