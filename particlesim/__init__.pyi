@@ -7,6 +7,7 @@ from .accuracy.tradeoff.sweep import tradeoff
 from .accuracy.tradeoff.table import Tradeoff
 from .accuracy.tune.report import Tuned
 from .accuracy.tune.tuning import tune
+from .constraints.bodies.body import Body
 from .constraints.boundaries.combined import ComplementBoundary, UnionBoundary
 from .constraints.boundaries.heightfield import HeightfieldBoundary
 from .constraints.boundaries.mesh import MeshBoundary
@@ -106,6 +107,7 @@ __all__ = [
     "ArtificialViscosity",
     "BallJoint",
     "Barostat",
+    "Body",
     "Bonds",
     "Boundary",
     "BoxBoundary",

@@ -11,6 +11,7 @@ from ..interactions.fluid.sph import SPH
 from ..interactions.fluid.viscosities import Viscosity
 from ..scene import scene
 from .bodies.cloth import add_cloth
+from .bodies.rigid import add_rigid_body
 from .bodies.rope import add_rope
 
 
@@ -19,6 +20,7 @@ class Scene(scene.Scene):
 
     add_rope = add_rope
     add_cloth = add_cloth
+    add_rigid_body = add_rigid_body
 
     def add_fluid(
         self,

@@ -17,6 +17,7 @@ from ...engine.state import OF_WORLDS
 from .. import files
 from ..fields import ParticleFields
 from ..lock import Lock
+from ..skin import Skin, read_broken
 
 # What every frame has; a field cannot have these names.
 COLUMNS = ("position", "velocity", "radius", "id", "group", "world")
@@ -139,12 +140,14 @@ class ParticleFrame:
             simulation; ``id`` (place in the world's scene), ``group`` (place among the names) and
             ``world``, (n,) int32; and the chosen fields, (n,) or (n, 3).
         boxes: Lengths of the worlds' periodic boxes, (worlds, 3); 0 on open axes.
+        triangles: (t, 3) rows, of the groups that are drawn as such, less those that are torn.
     """
 
     number: int
     time: float
     columns: dict[str, np.ndarray]
     boxes: np.ndarray
+    triangles: np.ndarray
 
 
 class ParticleRecorder(Recorder):
@@ -183,6 +186,12 @@ class ParticleRecorder(Recorder):
                     "leave it out",
                 )  # fmt: skip
         self.group_names, self._constant = _constant_columns(sim)
+        self.skins = [
+            (int(sim.model.offsets[w]) + group.start, Skin(group, sim.constraints, w))
+            for w, scene in enumerate(sim.scenes)
+            for group in scene.groups
+            if group.triangles is not None
+        ]  # with their first rows
         self.overwrite, self.resumed = overwrite, resume is not None
         self.last = resume
         self._closed = False
@@ -202,7 +211,12 @@ class ParticleRecorder(Recorder):
             **self.fields.read(),
         }
         boxes = sim.model.box_length.copy()
-        return ParticleFrame(sim.frame // self.every, sim.time, columns, boxes)
+        return ParticleFrame(sim.frame // self.every, sim.time, columns, boxes, self._triangles())
+
+    def _triangles(self) -> np.ndarray:
+        broken = read_broken(part for _, skin in self.skins for part, _ in skin.sides)
+        every = [first + skin.whole(broken) for first, skin in self.skins]
+        return np.concatenate([np.zeros((0, 3), dtype=np.int64), *every])
 
     def _write(self, frame: ParticleFrame) -> None:
         if self._closed or (self.last is not None and frame.number != self.last + 1):

@@ -18,8 +18,10 @@ class PlyRecorder(FolderRecorder):
     """Records frames as binary little-endian PLY files, ``out.frames/f.######.ply``.
 
     The properties of an element ``vertex`` are ``x y z vx vy vz radius id group world`` and the
-    fields, ``<name>`` or ``<name>_x <name>_y <name>_z``. Comments hold the frame, the time and the
-    names of the groups. There is no file ``out.ply``: readers take the numbered files as a series.
+    fields, ``<name>`` or ``<name>_x <name>_y <name>_z``. Groups that were given triangles are also
+    in an element ``face``, less those of which an edge is broken. Comments hold the frame, the time
+    and the names of the groups. There is no file ``out.ply``: readers take the numbered files as a
+    series.
 
     Arguments are those of :class:`~particlesim.output.recorders.base.ParticleRecorder`.
 
@@ -43,6 +45,9 @@ class PlyRecorder(FolderRecorder):
         with open(path, "wb") as file:
             file.write(self._header(frame, table).encode("ascii", "backslashreplace"))
             file.write(table.tobytes())
+            faces = np.empty(len(frame.triangles), dtype=[("count", "u1"), ("corners", "<i4", 3)])
+            faces["count"], faces["corners"] = 3, frame.triangles
+            file.write(faces.tobytes())
 
     def _header(self, frame: ParticleFrame, table: np.ndarray) -> str:
         comments = [f"frame {frame.number}", f"time {frame.time!r}"]
@@ -56,9 +61,14 @@ class PlyRecorder(FolderRecorder):
                 f"property {TYPES[table[name].dtype.str[1:]]} {name}"
                 for name in table.dtype.names or ()
             ),
+            *self._faces(frame),
             "end_header",
         ]
         return "\n".join(lines) + "\n"
+
+    def _faces(self, frame: ParticleFrame) -> list[str]:
+        count = f"element face {len(frame.triangles)}"
+        return [count, "property list uchar int vertex_indices"] if self.skins else []
 
 
 def _parts(name: str, array: np.ndarray) -> list[tuple[str, np.ndarray]]:

@@ -13,8 +13,8 @@ from ...engine.source import Source
 from ...interactions.fluid.sph import SPH
 from ...scene.group import Group, select
 from ...scene.scene import Scene
+from ..skin import Skin, read_broken
 from ..surface import Mesh, Surface
-from .breaking import Breakable, Tearable, breakable_sides, read_broken
 from .description import LinksPrim, MeshPrim, PointsPrim, Shape, StageInfo
 from .placement import closed, offsets, periodic_box
 from .shapes import SHAPES
@@ -24,6 +24,21 @@ PLAYBACK_FPS = 24.0  # where a frame is not a sensible part of a second
 FPS_RANGE = (1.0, 1000.0)
 LINK_WIDTH = 0.5  # of the mean particle diameter
 LINK_COLOR = (0.75, 0.72, 0.65)
+
+
+@dataclass(frozen=True, eq=False)
+class Breakable:
+    """Links of a constraint that may break, of one world."""
+
+    prim: LinksPrim
+    constraint: Any  # bound
+    rows: slice  # of its ``broken``
+    pairs: np.ndarray  # (m, 2), rows of the simulation's arrays
+    drawn: np.ndarray  # (m,) bool
+
+    def whole(self, broken: np.ndarray) -> np.ndarray:
+        """Pairs that are drawn and not broken."""
+        return self.pairs[self.drawn & ~broken[self.rows]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +84,7 @@ class Drawing:
         self._chosen = frozenset(self.worlds)
         self.groups = _chosen_groups([sim.scenes[w] for w in self.worlds], groups)
         self.breakable: list[Breakable] = []
-        self.tearable: list[Tearable] = []
+        self.tearable: dict[MeshPrim, Skin] = {}
         self.moving: list[tuple[Shape, Any]] = []  # with its boundary
         self.fluids: list[Fluid] = []
         if surface is not False:
@@ -101,8 +116,9 @@ class Drawing:
 
     def meshes(self) -> dict[MeshPrim, Mesh | np.ndarray]:
         """As it is now: of fluids points, triangles and normals, of what tears its triangles."""
-        broken = read_broken(part for each in self.tearable for part, _ in each.sides)
-        torn = {each.prim: each.whole(broken) for each in self.tearable}
+        skins = self.tearable.values()
+        broken = read_broken(part for skin in skins for part, _ in skin.sides)
+        torn = {prim: skin.whole(broken) for prim, skin in self.tearable.items()}
         return torn | {fluid.prim: fluid.surface.mesh() for fluid in self.fluids}
 
     def poses(self) -> dict[Shape, tuple[np.ndarray, np.ndarray]]:
@@ -144,12 +160,11 @@ class Drawing:
 
     def _meshes(self) -> Iterator[MeshPrim]:
         for w, group, rows in self._each_group(meshed=True):
-            surface = group.triangles
-            assert surface is not None
-            sides = list(breakable_sides(self.sim.constraints, w, group.indices[surface]))
-            prim = MeshPrim(w, group.name, group.color, rows, None if sides else surface)
-            if sides:
-                self.tearable.append(Tearable(prim, surface, sides))
+            skin = Skin(group, self.sim.constraints, w)
+            fixed = None if skin.sides else skin.triangles
+            prim = MeshPrim(w, group.name, group.color, rows, fixed)
+            if skin.sides:
+                self.tearable[prim] = skin
             yield prim
         yield from (fluid.prim for fluid in self.fluids)
 

@@ -15,11 +15,13 @@ range, negative counts) are a ``ValueError``; a function's docstring names only 
 from .arrange import links, rotate
 from .curves import curve
 from .distributions import maxwell_boltzmann, random, stretch, uniform_sphere
+from .enclosed import inside
 from .files import mesh
-from .meshes import edges, hinges, icosphere, inside, rectangle
+from .filling import mesh_points, mesh_tetrahedra
+from .meshes import edges, hinges, icosphere, rectangle
 from .plummer import plummer, plummer_velocity
 from .shapes import box, cylinder, lattice, sphere
-from .solids import box_tetrahedra, mesh_points, mesh_tetrahedra, surface
+from .solids import box_tetrahedra, surface
 
 __all__ = [
     "box",

@@ -8,8 +8,6 @@ import numpy as np
 
 from ... import validate
 
-PORTION = 1 << 22  # point and triangle pairs that are looked at at once
-
 
 def rectangle(corner: Any, edges: Any, cells: Any) -> tuple[np.ndarray, np.ndarray]:
     """A rectangle, or parallelogram, of triangles: two for each cell.
@@ -141,46 +139,6 @@ def hinges(triangles: Any) -> np.ndarray:
         if p < q and (q, p) in where
     ]
     return np.array(found, dtype=np.int64).reshape(-1, 4)
-
-
-def inside(points: Any, vertices: Any, triangles: Any) -> np.ndarray:
-    """Which points a closed surface has within.
-
-    Those about which it winds: the solid angles of the triangles, with their signs, sum to 4 pi
-    there and to 0 outside (Van Oosterom and Strackee 1983, eq. 8; Jacobson et al. 2013).
-
-    Args:
-        points: (n, 3) [length].
-        vertices: (v, 3) [length].
-        triangles: (t, 3) indices of vertices, counterclockwise from outside.
-
-    Returns:
-        (n,) bool.
-
-    Raises:
-        ValueError: A surface that is not closed: an edge that is not shared by two triangles which
-            turn the same way round.
-
-    Example:
-        >>> inside([(0, 0, 0), (0, 2, 0)], *icosphere((0, 0, 0), 1.0)).tolist()
-        [True, False]
-    """
-    owner = "sample.inside"
-    x = validate.rows(owner, "points", points, None, 3)
-    corners, index = closed(owner, vertices, triangles)
-    result = np.zeros(len(x), dtype=bool)
-    step = max(1, PORTION // len(index))
-    for first in range(0, len(x), step):
-        a, b, c = (corners[each] - x[first : first + step, None] for each in index.T)
-        la, lb, lc = (np.linalg.norm(each, axis=2) for each in (a, b, c))
-        above = (a * np.cross(b, c)).sum(axis=2)
-        below = (
-            la * lb * lc + (a * b).sum(axis=2) * lc + (b * c).sum(axis=2) * la
-            + (c * a).sum(axis=2) * lb
-        )  # fmt: skip
-        turns = np.arctan2(above, below).sum(axis=1) / (2.0 * np.pi)
-        result[first : first + step] = turns > 0.5
-    return result
 
 
 def closed(owner: str, vertices: Any, triangles: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -58,7 +58,7 @@ def test_a_flag_of_any_stiffness_stays_bounded(substeps, device):
     settings = ps.Settings(dt=1 / 60, substeps=substeps)
     sim = ps.Simulation(scenes, settings, device=device)
     mass = scenes[0].mass
-    with pytest.warns(ps.SimulationWarning, match="must hold within 2%"):
+    with pytest.warns(ps.SimulationWarning, match="must hold within"):
         for _ in range(300):
             sim.step()
             # It is let go at rest at height 0, and XPBD only takes energy away: what it has of

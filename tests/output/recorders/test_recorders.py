@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
+from cases.strip import squares, strip
 from particlesim.output.recorders import open_recorder
 from particlesim.output.recorders.ply import PlyRecorder
 
@@ -89,6 +90,22 @@ def test_ply(tmp_path, precision):
         found["time"] = float(next(c[1] for c in comments if c[0] == "time"))
         assert ["frame", str(k)] in comments and ["group", "1", "stone"] in comments
         assert_same(found, frame, EXACT)
+
+
+def test_ply_holds_triangles_that_are_not_torn(tmp_path):
+    scene, _ = strip()
+    sim = ps.Simulation(scene, ps.Settings(dt=1 / 32, substeps=4), device="cpu", worlds=2)
+    sim.run(1, record=tmp_path / "out.ply")
+    for frame, left in ((0, [0, 0, 1, 1, 2, 2]), (1, [0, 0, 2, 2])):
+        data = (tmp_path / "out.frames" / f"f.{frame:06d}.ply").read_bytes()
+        head, _, body = data.partition(b"end_header\n")
+        count = 2 * len(left)
+        assert f"element face {count}\nproperty list uchar int vertex_indices\n".encode() in head
+        faces = np.frombuffer(body[-13 * count :], dtype=[("count", "u1"), ("corners", "<i4", 3)])
+        assert (faces["count"] == 3).all()
+        for w in (0, 1):
+            corners = faces["corners"][w * len(left) : (w + 1) * len(left)]
+            assert squares(corners - 8 * w) == left
 
 
 def test_ply_is_read_by_vtk(tmp_path):

@@ -5,6 +5,7 @@ import pytest
 from pxr import UsdGeom
 
 import particlesim as ps
+from cases.strip import squares, strip
 
 from .drawn import SETTINGS, flying, names, pool, record
 from .recordings import checked, value
@@ -120,17 +121,7 @@ def test_broken_links_are_not_drawn(tmp_path, device):
 
 
 def test_torn_triangles_are_not_drawn(tmp_path, device):
-    # A strip of three squares hangs by its upper edge; the middle one's sides do not bear the rest.
-    strip = ps.sample.rectangle((0, 0, 0), [(1, 0, 0), (0, -3, 0)], cells=(1, 3))
-    edges = ps.sample.edges(strip[1])
-    height = strip[0][edges][:, :, 1]
-    weak = (height == -1).any(axis=1) & (height == -2).any(axis=1)
-    scene = ps.Scene()
-    scene.add_interaction(ps.UniformGravity((0, -10, 0)))
-    scene.add_cloth(
-        *strip, areal_density=1.0, pinned=np.flatnonzero(strip[0][:, 1] == 0),
-        break_force=np.where(weak, 1.0, 1e6), group="strip",
-    )  # fmt: skip
+    scene, weak = strip()
     sim = ps.Simulation(scene, ps.Settings(dt=1 / 32, substeps=4), device=device, worlds=2)
     states, velocities = record(sim, tmp_path / "out.usda", 2, fields=["speed"])
     assert (sim.constraints[0].broken == np.tile(weak, 2)).all()
@@ -141,8 +132,7 @@ def test_torn_triangles_are_not_drawn(tmp_path, device):
         counts = [len(value(stage, f"{prim}.faceVertexCounts", f)) for f in range(3)]
         assert counts == [6, 4, 4]
         left = np.reshape(value(stage, f"{prim}.faceVertexIndices", 2), (-1, 3))
-        squares = np.floor(-strip[0][left].mean(axis=1)[:, 1]).astype(int)
-        assert sorted(squares) == [0, 0, 2, 2]
+        assert squares(left) == [0, 0, 2, 2]
         rows = slice(8 * w, 8 * w + 8)
         np.testing.assert_array_equal(value(stage, f"{prim}.points", 2), states[2, rows])
         np.testing.assert_array_equal(value(stage, f"{prim}.velocities", 2), velocities[2, rows])
