@@ -14,6 +14,8 @@ from .constraints.contact import Contact
 from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
 from .constraints.gradient import check_gradient
+from .constraints.kinds.bending import Bending, hinges
+from .constraints.kinds.isometric_bending import IsometricBending
 from .engine.execution.launch import launch
 from .engine.integrators.integrator import Integrator
 from .instruments.correlations import (
@@ -97,6 +99,7 @@ __all__ = [
     "Angles",
     "ArtificialViscosity",
     "Barostat",
+    "Bending",
     "Bonds",
     "Boundary",
     "BoxBoundary",
@@ -130,6 +133,7 @@ __all__ = [
     "Incident",
     "Integrator",
     "Interaction",
+    "IsometricBending",
     "Isothermal",
     "LaminarViscosity",
     "Langevin",
@@ -182,6 +186,7 @@ __all__ = [
     "Yukawa",
     "__version__",
     "check_gradient",
+    "hinges",
     "launch",
     "law",
     "mean_square_displacement",

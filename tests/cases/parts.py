@@ -21,6 +21,7 @@ PAIRS = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (6, 7)]
 TUPLES = {
     "pairs": PAIRS, "particles": PAIRS, "triples": [(0, 1, 3), (1, 3, 7), (4, 5, 7), (2, 6, 4)],
     "quadruples": [(0, 1, 3, 7), (5, 4, 6, 2), (0, 2, 6, 7)],
+    "hinges": [(0, 1, 3, 7), (5, 4, 6, 2), (0, 2, 6, 7)],
 }  # fmt: skip
 
 
@@ -108,6 +109,11 @@ QUANTITIES = {
     ("SoftSphere", "sigma"): Quantity(1.6, (1, 0, 0)),
     "rest_angle": Quantity(1.9),
     ("HarmonicAngles", "stiffness"): Quantity(3.0, (2, 1, -2)),
+    ("Bending", "rest_angle"): Quantity(0.7, kind="signed"),
+    ("Bending", "compliance"): Quantity(0.3, (-2, -1, 2)),
+    ("Bending", "damping"): Quantity(0.2, (2, 1, -1)),
+    ("IsometricBending", "compliance"): Quantity(0.3, (-2, -1, 2)),
+    ("IsometricBending", "damping"): Quantity(0.2, (2, 1, -1)),
     ("SphereBoundary", "radius"): Quantity(1.9, (1, 0, 0)),
     ("Distance", "damping"): Quantity(0.5, (0, 1, -1)),
 }
@@ -132,7 +138,7 @@ KIN = {
     "ElasticSolid": "Springs",
     "HarmonicBonds": "Springs", "FENEBonds": "Bonds", "HarmonicAngles": "Angles",
     "Mie": "LennardJones", "Yukawa": "PairPotential", "Morse": "PairPotential",
-    "DFSPH": "SPH",
+    "DFSPH": "SPH", "Bending": "Constraint", "IsometricBending": "Constraint",
     "SoftSphere": "PairPotential", "Coulomb": "PairPotential", "Electrostatics": "PairPotential",
 }  # fmt: skip
 # To a grid, which rests in the frame that it is made in, and to groups of several fluids.
