@@ -23,6 +23,8 @@ from .constraints.contact import Contact
 from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
 from .constraints.gradient import check_gradient
+from .constraints.kinds.bending import Bending, hinges
+from .constraints.kinds.isometric_bending import IsometricBending
 from .constraints.scene import Scene
 from .engine.execution.launch import launch
 from .engine.integrators.integrator import Integrator
@@ -107,6 +109,7 @@ __all__ = [
     "ArtificialViscosity",
     "BallJoint",
     "Barostat",
+    "Bending",
     "Body",
     "Bonds",
     "Boundary",
@@ -146,6 +149,7 @@ __all__ = [
     "Incident",
     "Integrator",
     "Interaction",
+    "IsometricBending",
     "Isothermal",
     "Keyframes",
     "LaminarViscosity",
@@ -204,6 +208,7 @@ __all__ = [
     "Yukawa",
     "__version__",
     "check_gradient",
+    "hinges",
     "launch",
     "law",
     "mean_square_displacement",
