@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import warp as wp
 
-from .precision import Precision
+from .precision import Precision, structure
 
 
 def parameter_types(values: Mapping[str, Any], precision: Precision) -> dict[str, Any]:
-    """What kernels take these values of parameters as, by name."""
-    return {name: _parameter_type(value, precision) for name, value in values.items()}
+    """What kernels take these values of parameters as, by name.
+
+    Whole numbers, numbers, (3,) vectors, arrays of a device, or a dict of such: a struct within.
+    """
+    return {name: _parameter_type(name, value, precision) for name, value in values.items()}
 
 
-def _parameter_type(value: Any, precision: Precision) -> Any:
+def _parameter_type(name: str, value: Any, precision: Precision) -> Any:
+    if isinstance(value, Mapping):
+        return structure(f"Inner_{name}", parameter_types(value, precision))
     if isinstance(value, wp.array):
         return wp.array(dtype=value.dtype, ndim=value.ndim)
     value = np.asarray(value)
@@ -27,8 +32,37 @@ def _parameter_type(value: Any, precision: Precision) -> Any:
     return precision.vec3 if np.ndim(value) == 1 else precision.scalar
 
 
-def in_memory(column: Any) -> Any:
-    """A column of a struct's parameters as it lies in memory: arrays by what they are to Warp."""
-    if len(column) and isinstance(column[0], wp.array):
-        return [each.__ctype__().numpy_value() for each in column]
-    return column
+def structures(kind: Any, columns: Mapping[str, Any], device: Any) -> wp.array:
+    """An array of structs from a column of values for each field; arrays stay the giver's."""
+    host = np.zeros(len(next(iter(columns.values()))), dtype=kind.numpy_dtype())
+    _fill(host, columns)
+    return wp.array(host, dtype=kind, device=device)
+
+
+def _fill(host: np.ndarray, columns: Mapping[str, Any]) -> None:
+    for name, column in columns.items():
+        if not len(column):
+            continue
+        if isinstance(column[0], Mapping):
+            _fill(host[name], by_name(column))
+        elif isinstance(column[0], wp.array):
+            host[name] = [each.__ctype__().numpy_value() for each in column]
+        else:
+            host[name] = column
+
+
+def by_name(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    """Columns of rows that have the same names."""
+    return {name: [row[name] for row in rows] for name in rows[0]}
+
+
+def numbers(columns: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """The columns of numbers and vectors, those of structs within them too, by their names."""
+    found: dict[str, np.ndarray] = {}
+    for name, column in columns.items():
+        if isinstance(column[0], Mapping):
+            inner = numbers(by_name(column))
+            found |= {f"{name}.{key}": value for key, value in inner.items()}
+        elif not isinstance(column[0], wp.array | np.uint64):
+            found[name] = np.array(column)
+    return found

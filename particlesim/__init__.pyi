@@ -8,6 +8,7 @@ from .accuracy.tradeoff.table import Tradeoff
 from .accuracy.tune.report import Tuned
 from .accuracy.tune.tuning import tune
 from .constraints.bodies.body import Body
+from .constraints.boundaries.combined import ComplementBoundary, UnionBoundary
 from .constraints.boundaries.heightfield import HeightfieldBoundary
 from .constraints.boundaries.mesh import MeshBoundary
 from .constraints.boundaries.motion import Keyframes, Trajectory
@@ -15,11 +16,13 @@ from .constraints.boundaries.round import CapsuleBoundary, CylinderBoundary
 from .constraints.boundaries.sampled import SDFBoundary
 from .constraints.boundary import Boundary
 from .constraints.boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
+from .constraints.clusters.joints import BallJoint, Hinge
 from .constraints.clusters.shape_matching import ShapeMatching
 from .constraints.constraint import Constraint
 from .constraints.contact import Contact
 from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
+from .constraints.gradient import check_gradient
 from .constraints.scene import Scene
 from .engine.execution.launch import launch
 from .engine.integrators.integrator import Integrator
@@ -102,6 +105,7 @@ __all__ = [
     "AdaptiveSmoothing",
     "Angles",
     "ArtificialViscosity",
+    "BallJoint",
     "Barostat",
     "Body",
     "Bonds",
@@ -110,6 +114,7 @@ __all__ = [
     "Camera",
     "CapsuleBoundary",
     "CellRescaling",
+    "ComplementBoundary",
     "ConstantForce",
     "Constraint",
     "ConstraintBase",
@@ -135,6 +140,7 @@ __all__ = [
     "HarmonicBonds",
     "HeightfieldBoundary",
     "HertzianGrains",
+    "Hinge",
     "History",
     "IdealGas",
     "Incident",
@@ -188,6 +194,7 @@ __all__ = [
     "Trajectory",
     "Tuned",
     "UniformGravity",
+    "UnionBoundary",
     "UsdRecorder",
     "VelocityRescaling",
     "Viscosity",
@@ -196,6 +203,7 @@ __all__ = [
     "WendlandC6",
     "Yukawa",
     "__version__",
+    "check_gradient",
     "launch",
     "law",
     "mean_square_displacement",

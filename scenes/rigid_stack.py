@@ -24,7 +24,7 @@ def build(boxes: int = 10, density: float = 800.0, friction: float = 0.5) -> ps.
     for k in range(boxes):
         aside = 0.25 * SPACING * (-1) ** k  # a ball over the middle of four
         low = np.array([aside - 0.5 * SIDE, k * height, aside - 0.5 * SIDE])
-        box = ps.sample.box(low, low + (SIDE, 0.3, SIDE), SPACING)
+        box = ps.sample.box(low, low + np.array([SIDE, 0.3, SIDE]), SPACING)
         scene.add_rigid_body(box, spacing=SPACING, density=density)
     scene.add_constraint(ps.Contact(friction=friction))
     scene.add_constraint(ps.PlaneBoundary((0, 0, 0), (0, 1, 0), friction=friction))

@@ -6,7 +6,14 @@ import warp as wp
 
 from ..engine.easing import ease_function, easing_type
 from ..precision import Precision, function, register
-from .boundaries.meeting import Form, held_type, meeting_function, seen_function, velocity_function
+from .boundaries.meeting import (
+    Form,
+    held_type,
+    meeting_function,
+    seen_function,
+    touching_function,
+    velocity_function,
+)
 from .boundary_shapes import normals_type
 from .constraints import bodies_type, place_function, rounding_function
 from .rigid_motion import frame_functions
@@ -110,11 +117,11 @@ def begin_kernel(form: Form) -> wp.Kernel:
 @functools.cache
 def project_kernel(form: Form) -> wp.Kernel:
     """Kernel: particles are brought back to where they may be, and held along it."""
-    _, sides, precision, params, compensated, _, _ = form
+    sides, precision, params, compensated = form[1:5]
     vec3, real = precision.vec3, precision.scalar
     Bodies, Held = bodies_type(precision), held_type(precision, sides)
     kept, place = rounding_function(precision, compensated), place_function(precision, compensated)
-    meet, rub = meeting_function(form), rubbing_function(form)
+    meet, rub, touching = meeting_function(form), rubbing_function(form), touching_function(form)
 
     @register
     def project_boundary(
@@ -134,7 +141,8 @@ def project_kernel(form: Form) -> wp.Kernel:
                 dx = dx + N[a] * back[a]
         if timed * p.friction > real(0.0):
             u = b.v[i] * dt + b.correction[i]
-            dx = dx - rub(k, x, u, dt, w, back, N, p.friction, h)
+            mu, _rest = touching(i, w, x, e, p, h)
+            dx = dx - rub(k, x, u, dt, w, back, N, mu, h)
         touched = dx[0] != real(0.0) or dx[1] != real(0.0) or dx[2] != real(0.0)
         if touched and b.w[i] > real(0.0):
             place(i, x, e, dx, b)

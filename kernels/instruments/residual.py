@@ -7,6 +7,7 @@ import warp as wp
 from ..constraints.boundaries.meeting import Form, held_type, meeting_function
 from ..constraints.constraint_force import counted_function
 from ..constraints.constraints import Solved, bodies_type, rounding_function, view_function
+from ..constraints.unmet import lack_function, off_function
 from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
 from ..precision import Precision, register
 
@@ -39,8 +40,8 @@ def off_kernel(law: Solved) -> wp.Kernel:
     F = lam / dt^2 is the force of its multiplier: what it is off by where it should give way, too.
     """
     real, Box, Tuples, Bodies = law.types
-    size, view = law.size, view_function(law)
-    damped, one_sided, breakable = law.damped, law.one_sided, law.breakable
+    size, view, damped = law.size, view_function(law), law.damped
+    off, lack = off_function(law), lack_function(law)
 
     @register
     def measure_off(
@@ -52,26 +53,13 @@ def off_kernel(law: Solved) -> wp.Kernel:
     ):
         r = first + wp.tid()
         X, C, G = view(r, box, t, b)
-        q = t.item[r]
-        extent = real(0.0)
-        slope = real(0.0)
-        rate = real(0.0)
-        for a in range(wp.static(size)):
-            extent = wp.max(extent, wp.length(X[a] - X[0]))
-            slope = slope + wp.length_sq(G[a])
-            rate = rate + wp.dot(G[a], b.v[t.particle[r][a]])
         F = wp.float64(t.lam[r]) * t.scale[0] * wp.float64(b.unit)
         if wp.static(damped):
-            F = F + wp.float64(q.damping) * wp.float64(rate)
-        miss = wp.abs(wp.float64(C) + wp.float64(q.compliance) * F)
-        if wp.static(one_sided):
-            miss = wp.where(C >= real(0.0), wp.float64(0.0), miss)
-        if wp.static(breakable):
-            if t.broken[r] != 0:
-                miss = wp.float64(0.0)
-        if miss > wp.float64(0.0):
-            miss = miss / wp.float64(wp.sqrt(slope) * extent)
-        off_out[r] = real(miss)
+            rate = real(0.0)
+            for a in range(wp.static(size)):
+                rate = rate + wp.dot(G[a], b.v[t.particle[r][a]])
+            F = F + wp.float64(t.item[r].damping) * wp.float64(rate)
+        off_out[r] = off(X, G, lack(r, C, F, t))
 
     return measure_off
 
@@ -79,7 +67,7 @@ def off_kernel(law: Solved) -> wp.Kernel:
 @functools.cache
 def boundary_kernel(form: Form) -> wp.Kernel:
     """Kernel: how deep each particle is inside of a boundary, on its worst side."""
-    _, sides, precision, params, compensated, _, _ = form
+    sides, precision, params, compensated = form[1:5]
     real, each = precision.scalar, precision.vector(sides)
     Bodies, Held = bodies_type(precision), held_type(precision, sides)
     meet, kept = meeting_function(form), rounding_function(precision, compensated)

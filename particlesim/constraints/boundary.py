@@ -9,19 +9,17 @@ import numpy as np
 import warp as wp
 
 from .. import validate
-from ..engine.model import Model
 from ..interactions.laws.arguments import Arguments
 from ..kernels.constraints import boundary_shapes as kernels
 from ..kernels.constraints import walls
+from ..kernels.constraints.boundaries import ready
 from ..kernels.precision import FLOAT64, Precision, structure
-from ..scene.law import Law
 from ..scene.law import law as make_law
+from .boundaries.combined import Combinable
 from .boundaries.drawing import level_set, nodes
 from .boundaries.motion import Motion
-from .holding import Holding
+from .boundaries.solid import STILL, SolidBoundary
 
-STILL = (0.0, 0.0, 0.0)
-PLACES = 4096  # at which a law is asked for its period
 # Arguments of every boundary.
 OWN = frozenset(
     {
@@ -39,7 +37,7 @@ OWN = frozenset(
 )
 
 
-class Boundary(Holding):
+class Boundary(Combinable, SolidBoundary):
     """What holds particles off by their radius, d(x) >= R, from one law: its signed distance d.
 
     Particles are held with nothing to soften it. Friction takes back the tangential way of the
@@ -89,8 +87,6 @@ class Boundary(Holding):
         [0.8, 0.1]
     """
 
-    law: Law  # of the class, where that has a surface of its own
-
     def __init__(
         self, law: Any, friction: float = 0.0, restitution: float = 0.0, group: Any = None, *,
         velocity: Sequence[float] = STILL, angular_velocity: Sequence[float] = STILL,
@@ -103,34 +99,6 @@ class Boundary(Holding):
         self.law.check_derivable(self.name)
         self.parameters = self._values(parameters)
         self._box = None if drawn is None else self._corners(drawn)
-
-    def _holds(
-        self, friction: float, restitution: float, group: Any, velocity: Sequence[float],
-        angular_velocity: Sequence[float], slip: bool, motion: Motion | None,
-    ) -> None:  # fmt: skip
-        """What boundaries of every surface are made with."""
-        self.group, self.slip, self.motion = group, bool(slip), motion
-        self.friction = validate.number(self.name, "friction", friction, minimum=0.0)
-        self.restitution = validate.number(
-            self.name, "restitution", restitution, minimum=0.0, maximum=1.0
-        )
-        self.velocity = validate.vector(self.name, "velocity", velocity, unit="length/time")
-        self.angular_velocity = validate.vector(
-            self.name, "angular_velocity", angular_velocity, unit="rad/time"
-        )
-        if motion is not None and not isinstance(motion, Motion):
-            raise validate.fail(
-                self.name,
-                "motion",
-                "be a Trajectory or Keyframes",
-                motion,
-                "make one, or leave it out",
-            )
-        if motion is not None and (self.velocity.any() or self.angular_velocity.any()):
-            raise validate.fail(
-                self.name, "velocity", "be 0 with a motion, which has velocities of its own",
-                [self.velocity.tolist(), self.angular_velocity.tolist()], "leave it out",
-            )  # fmt: skip
 
     def _values(self, given: dict[str, Any]) -> dict[str, Any]:
         """The law's further parameters."""
@@ -166,8 +134,7 @@ class Boundary(Holding):
 
     def kind(self) -> tuple[Any, ...]:
         given = (self.law.key, tuple(self.parameters)) if "law" in vars(self) else ()
-        motion = () if self.motion is None else self.motion.kind()
-        return (type(self), self.slip, *given, *motion)
+        return (*super().kind(), *given)
 
     def distance(self, points: Any) -> np.ndarray:
         """The law at points (n, 3) [length] of the boundary as described, that is at time 0.
@@ -192,39 +159,6 @@ class Boundary(Holding):
         wp.launch(kernel, len(x), [given, places], [found], device="cpu")
         return found.numpy()
 
-    @property
-    def moves(self) -> bool:
-        """Its surface has a velocity."""
-        given = self.velocity.any() or self.angular_velocity.any()
-        return self.motion is not None or bool(given)
-
-    def drift(self, time: float) -> np.ndarray:
-        """The velocity of its pivot at ``time``, (3,) [length/time]."""
-        return self.velocity if self.motion is None else self.motion.at(time, self._pivot())[2]
-
-    def pose(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Where it is: what is at x as described is at R x + T at ``time``.
-
-        Args:
-            time: Of its world, since the start [time].
-
-        Returns:
-            T, (3,) [length], and R, (3, 3). What moves the shape in itself, as a plane along
-            itself or a sphere about its center, is left out.
-        """
-        if self.motion is not None:
-            pivot = self._pivot()
-            way, rotation, _ = self.motion.at(time, pivot)
-            return way + pivot - rotation @ pivot, rotation
-        travel, turn = self._carried()
-        angle = float(np.linalg.norm(turn)) * time
-        rotation = np.eye(3)
-        if angle != 0.0:
-            cross = np.cross(np.eye(3), turn / np.linalg.norm(turn))
-            rotation += np.sin(angle) * cross + 2 * np.sin(angle / 2) ** 2 * cross @ cross
-        pivot = self._pivot()
-        return travel * time + pivot - rotation @ pivot, rotation
-
     def shapes(self) -> list[dict[str, Any]]:
         """Its surface in the box that is drawn, clear where it closes in the particles."""
         if self._box is None:
@@ -233,46 +167,9 @@ class Boundary(Holding):
         mesh = level_set(self.distance(places).reshape(counts), *self._box)
         return [self._shape("mesh", **mesh)] if mesh else []
 
-    def _shape(self, kind: str, **parameters: Any) -> dict[str, Any]:
-        """A shape for recordings, which ask a moving one for its pose."""
-        moving = self.motion is not None or any(each.any() for each in self._carried())
-        return {"kind": kind, "moving": moving, **parameters}
-
-    def _pivot(self) -> np.ndarray:
-        """What it turns about, as described."""
-        return self.pivot
-
-    def _carried(self) -> tuple[np.ndarray, np.ndarray]:
-        """Velocity and angular velocity, less what moves the shape in itself."""
-        return self.velocity, self.angular_velocity
-
     def _geometry(self, device: Any, precision: Precision) -> dict[str, Any]:
         """What the surface takes, by name."""
         return self.parameters
-
-    def _check(self, model: Model, w: int) -> None:
-        """The shape is fit for world w: along a periodic axis, one period on it is the same."""
-        axes = np.flatnonzero(model.periodic)
-        if not len(axes) or not model.scenes[w].particle_count:
-            return
-        if self.angular_velocity.any():
-            raise validate.fail(
-                self.name, "angular_velocity", "be 0 in a periodic scene", self.angular_velocity,
-                "leave it out",
-            )  # fmt: skip
-        x, length = model.scenes[w].position, model.box_length[w]
-        lower = np.where(model.periodic, model.box_lower[w], x.min(axis=0) - length.max())
-        upper = np.where(model.periodic, lower + length, x.max(axis=0) + length.max())
-        points = np.random.default_rng(0).uniform(lower, upper, (PLACES, 3))
-        d = self.distance(points)
-        for axis in axes:
-            gap = np.abs(self.distance(points + length * np.eye(3)[axis]) - d).max()
-            if not gap <= 1e-6 * length[axis]:
-                raise validate.fail(
-                    self.name, f"law {self.law.name}" if hasattr(self, "law") else "surface",
-                    f"be the same one period on, {length[axis]:g} along {'xyz'[axis]} [length]",
-                    f"a difference of {gap:g}", "give it that period, or leave the axis open",
-                )  # fmt: skip
 
     def surface(self, precision: Precision) -> wp.Function:
         """Where it is, as a Warp function (see kernels.constraints.boundary_shapes)."""
@@ -282,3 +179,8 @@ class Boundary(Holding):
     def facing(self, precision: Precision, params: Any) -> wp.Function:
         law = self.law.function(precision, self.name, float)
         return walls.distance_facing(law, tuple(self.parameters), precision, params)
+
+    def near(self, precision: Precision, params: Any) -> wp.Function:
+        """The nearest point, as a Warp function (see kernels.constraints.boundaries.nearest)."""
+        law = self.law.function(precision, self.name, float)
+        return ready.law_near(law, tuple(self.parameters), precision, params)

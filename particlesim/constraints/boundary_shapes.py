@@ -14,10 +14,12 @@ from ..engine.model import Model
 from ..engine.probe import Probe
 from ..kernels.constraints import boundary_shapes as kernels
 from ..kernels.constraints import walls
+from ..kernels.constraints.boundaries import ready
 from ..kernels.precision import Precision
 from ..scene.law import law
 from .boundaries.motion import Motion
-from .boundary import STILL, Boundary
+from .boundaries.solid import STILL
+from .boundary import Boundary
 from .limits import crossing_limits
 
 
@@ -76,6 +78,9 @@ class PlaneBoundary(Boundary):
 
     def facing(self, precision: Precision, params: Any) -> wp.Function:
         return walls.plane_facing(precision, params)
+
+    def near(self, precision: Precision, params: Any) -> wp.Function:
+        return ready.plane_near(precision, params)
 
     def _geometry(self, device: Any, precision: Precision) -> dict[str, Any]:
         return {"point": self.point, "normal": self.normal}
@@ -173,6 +178,9 @@ class BoxBoundary(Boundary):
     def facing(self, precision: Precision, params: Any) -> wp.Function:
         return walls.box_facing(precision, params)
 
+    def near(self, precision: Precision, params: Any) -> wp.Function:
+        return ready.box_near(precision, params)
+
     def _geometry(self, device: Any, precision: Precision) -> dict[str, Any]:
         return {"lower": self.lower, "upper": self.upper}
 
@@ -183,6 +191,9 @@ class BoxBoundary(Boundary):
         """|v| dt <= upper - lower along each axis; half spaces are never passed through."""
         names = [f"width / v along {axis}" for axis in "xyz"]
         return crossing_limits(self, probe, names, lambda box, v: (box.upper - box.lower) / abs(v))
+
+    def width(self) -> float:
+        return float((self.upper - self.lower).min())
 
     def _pivot(self) -> np.ndarray:
         closed = np.isfinite(self.lower).all() and np.isfinite(self.upper).all()
@@ -253,6 +264,9 @@ class SphereBoundary(Boundary):
     def facing(self, precision: Precision, params: Any) -> wp.Function:
         return walls.sphere_facing(precision, params)
 
+    def near(self, precision: Precision, params: Any) -> wp.Function:
+        return ready.sphere_near(precision, params)
+
     def _geometry(self, device: Any, precision: Precision) -> dict[str, Any]:
         return {"center": self.center, "radius": self.radius, "inside": int(self.inside)}
 
@@ -266,6 +280,9 @@ class SphereBoundary(Boundary):
             self, probe, ["radius / v"],
             lambda ball, v: ball.radius / np.linalg.norm(v, axis=1, keepdims=True),
         )  # fmt: skip
+
+    def width(self) -> float:
+        return self.radius
 
     def _pivot(self) -> np.ndarray:
         return self.center

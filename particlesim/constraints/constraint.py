@@ -216,6 +216,14 @@ class Constraint(ReadTuples):
         self.fresh = False
         self.solver.sweep(scale, own, 1.0 / dt)
 
+    def go_on(self, count: wp.array, omega: wp.array) -> None:
+        if self.count:
+            self.solver.go_on(count, omega)
+
+    def look(self, flag: wp.array, tolerance: float, dt: float) -> None:
+        if self.count:
+            self.solver.look(flag, tolerance)
+
     def start_bounce(self, state: State, neighbors: Neighbors, bounces: Any, dt: float) -> None:
         if self.count:
             self.velocities.start_bounce()

@@ -20,7 +20,7 @@ from ..kernels.constraints.boundaries.bounce import bounce_kernel, start_bounce_
 from ..kernels.constraints.boundaries.meeting import Form, held_type
 from ..kernels.constraints.boundaries.paths import SHORT
 from ..kernels.constraints.rigid_motion import motion_type, pose_kernel, pose_type
-from ..kernels.parameters import in_memory
+from ..kernels.parameters import by_name, numbers
 from ..kernels.precision import Precision
 from ..scene.wall import Wall
 from .easing import EasedConstraint
@@ -35,6 +35,7 @@ class Holding(EasedConstraint):
     solid = True
     sides = 1  # at most how many of them a particle touches at once
     tracked = False  # its surface looks at the way of a substep
+    mixed = False  # its parts have frictions and restitutions of their own
     slip: bool
     places: tuple[int, ...] = (0,)  # see Wall
 
@@ -44,6 +45,10 @@ class Holding(EasedConstraint):
 
     def facing(self, precision: Precision, params: Any) -> wp.Function:
         """How far its sides are, as a Warp function (see kernels.constraints.walls)."""
+        raise NotImplementedError
+
+    def touch(self, precision: Precision, params: Any) -> wp.Function:
+        """Friction and restitution there (see kernels.constraints.boundaries.combined)."""
         raise NotImplementedError
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
@@ -61,12 +66,11 @@ class Holding(EasedConstraint):
         self.worlds_held = model.world_of[members]
         self.held.world = model.array(self.worlds_held, wp.int32)
         columns = self._columns(model, ["friction", "restitution"])
-        numbers = {name: each for name, each in columns.items() if isinstance(each, np.ndarray)}
-        model.fits(self.name, numbers)
+        model.fits(self.name, numbers(columns))
         radii = model.column("radius")[members]
         model.squares_fit(self.name, "radius", np.concatenate([radii, model.apart()[0]]))
         self.Params, self.params = model.parameters(f"{type(self).__name__}Parameters", columns)
-        self.rough, self.bouncing = columns["friction"].any(), columns["restitution"].any()
+        self.rough, self.bouncing = any(columns["friction"]), any(columns["restitution"])
         self.moving = any(peer.moves for peer in self.peers)
         if self.moving:
             self.requires = self.requires | {"time"}
@@ -80,11 +84,7 @@ class Holding(EasedConstraint):
             }
             for peer in self.peers
         ]
-        columns = {name: [row[name] for row in rows] for name in rows[0]}
-        return {
-            name: column if isinstance(column[0], wp.array) else np.array(column)
-            for name, column in columns.items()
-        }
+        return by_name(rows)
 
     def wall(self, model: Model, state: State) -> Wall:
         """What it is to a continuum."""
@@ -115,7 +115,7 @@ class Holding(EasedConstraint):
         self.force = state.force if forces else wp.empty(0, dtype=precision.vec3, device=device)
         self.form = Form(
             self.surface(precision), self.sides, precision, self.Params, "position_error" in state,
-            self.moving, self.tracked,
+            self.moving, self.tracked, self.touch(precision, self.Params) if self.mixed else None,
         )  # fmt: skip
         self.begin_kernel = kernels.begin_kernel(self.form)
         self.project_kernel = kernels.project_kernel(self.form)
@@ -153,8 +153,7 @@ class Holding(EasedConstraint):
         instant = model.settings.dt * SHORT
         given = [peer.motion.struct(model.device, peer._pivot(), instant) for peer in self.peers]
         Params = given[0][0]
-        columns = {key: in_memory([values[key] for _, values in given]) for key in given[0][1]}
-        motions = model.structures(Params, columns)
+        motions = model.structures(Params, by_name([values for _, values in given]))
         kernel = self.peers[0].motion.kernel(model.precision, Params)
         inputs = [motions, state.time, pose]
         return lambda: launch(kernel, len(pose), inputs, model.device)

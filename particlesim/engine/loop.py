@@ -16,14 +16,15 @@ from ..scene.part import Interaction, Part, names_velocity
 from ..scene.scene import Scene
 from ..scene.settings import Settings
 from ..scene.thermostat import Barostat, Thermostat
+from .constraining.bounces import Bounces
+from .constraining.sweeps import Sweeps
 from .execution.acting import act
 from .execution.launch import owner
 from .integrators import Integrator, method
-from .integrators.bounces import Bounces
 from .limit import Limit, Pacing
 from .model import Model
 from .neighbors.lists import Neighbors
-from .observers import EXCHANGE, FINISH, FOLLOW, FORCE, PROJECT, Observers
+from .observers import EXCHANGE, FINISH, FOLLOW, FORCE, Observers
 from .state import State
 
 LEFT_BY_FORCES = ("force", "density", "pressure", "smoothing_length")
@@ -82,8 +83,8 @@ class Loop:
         for part in self.parts:
             part.attach(model, self.state)
         self.passes = in_turn(fuse(self.interactions))
-        self.swept = sorted(self.constraints, key=lambda each: each.rank)
-        self.bounces = Bounces(model, self.state, self.swept)
+        self.sweeps = Sweeps(model, self.state, self.constraints)
+        self.bounces = Bounces(model, self.state, self.sweeps.constraints)
         self.observers = Observers()
         # Worlds that are not as the last evaluation of the forces, or the substep after it, left
         # them.
@@ -108,7 +109,7 @@ class Loop:
         self._go_on("advance", dt)
         if not self.integrator.carries_forces:
             self.hold(dt)
-        for constraint in self.swept:
+        for constraint in self.sweeps.constraints:
             inputs = self.state, self.neighbors, dt
             self.observers.act(constraint, FINISH, constraint.finish, *inputs)
         self.observers.end(dt)
@@ -153,18 +154,12 @@ class Loop:
         self.integrator.settle(dt)
 
     def constrain(self, dt: float, iterations: int) -> None:
-        """Constraints project the positions in turn, by rank: friction sees all others."""
-        if not self.swept:
+        """Constraints project the positions, in sweeps over all of them."""
+        if not self.constraints:
             return
         with owner("pair lists"):
             self.neighbors.update_for_constraints(self.state)
-        now = self.state, self.neighbors, dt
-        for constraint in self.swept:
-            with owner(constraint.name):
-                act(constraint, constraint.begin, *now)
-        for _ in range(iterations):
-            for constraint in self.swept:
-                self.observers.act(constraint, PROJECT, constraint.project, *now)
+        self.sweeps.act(self.observers, self.state, self.neighbors, dt, iterations)
 
     def _check_takes(self, moves: type[Integrator]) -> None:
         """Refuse what the integrator cannot move."""

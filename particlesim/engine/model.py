@@ -11,7 +11,7 @@ import warp as wp
 
 from .. import validate
 from ..kernels.engine.loops import Periodicity, box_type
-from ..kernels.parameters import in_memory, parameter_types
+from ..kernels.parameters import parameter_types, structures
 from ..kernels.precision import PRECISIONS, structure
 from ..kernels.self_check import fast_ways
 from ..scene import ranges
@@ -167,11 +167,7 @@ class Model:
 
     def structures(self, kind: Any, columns: Mapping[str, Any]) -> wp.array:
         """An array of ``wp.struct`` from one host column a field."""
-        count = len(next(iter(columns.values())))
-        host = np.zeros(count, dtype=kind.numpy_dtype())
-        for name, column in columns.items():
-            host[name] = column
-        return wp.array(host, dtype=kind, device=self.device)
+        return structures(kind, columns, self.device)
 
     def fits(self, owner: str, columns: Mapping[str, np.ndarray]) -> None:
         """Refuse numbers that the kernels' precision cannot hold (see ``scene.ranges``)."""
@@ -231,7 +227,7 @@ class Model:
             for key, column in columns.items()
         }
         kind = structure(name, parameter_types(first, self.precision))
-        return kind, self.structures(kind, {key: in_memory(columns[key]) for key in columns})
+        return kind, self.structures(kind, columns)
 
     def array(self, values: Any, dtype: Any) -> wp.array:
         """A device array of host values."""

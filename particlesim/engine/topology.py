@@ -132,12 +132,26 @@ def rest_lengths(
     return result
 
 
+def pieces(model: Model, w: int, index: np.ndarray) -> np.ndarray:
+    """Positions at the start, (m, k, 3) [length], each seen from the first of its tuple.
+
+    In a periodic scene each is the image next to the one before it.
+    """
+    places = np.cumsum(_ways(model, w, index), axis=1)
+    return np.concatenate([np.zeros((len(index), 1, 3)), places], axis=1)
+
+
 def steps(model: Model, w: int, index: np.ndarray) -> np.ndarray:
     """Distances at the start from each particle of a tuple to the next, (m, k - 1) [length]."""
+    return np.linalg.norm(_ways(model, w, index), axis=2)
+
+
+def _ways(model: Model, w: int, index: np.ndarray) -> np.ndarray:
+    """From each particle of a tuple to the next, (m, k - 1, 3) [length], to the nearest image."""
     d = np.diff(model.scenes[w].position[index], axis=1)
     length = model.box_length[w]
     wrapped = np.divide(d, length, out=np.zeros_like(d), where=length > 0)
-    return np.linalg.norm(d - length * np.round(wrapped), axis=2)
+    return d - length * np.round(wrapped)
 
 
 def colors(index: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ..constraints.boundary import Boundary
+from ..constraints.boundaries.solid import SolidBoundary
 from ..constraints.constraint import Constraint
 from ..constraints.contact import Contact
 from ..engine.execution.launch import launch
@@ -70,8 +70,8 @@ def _of_tuples(constraint: Constraint, sim: Source) -> tuple[np.ndarray, np.ndar
     return _run(kernel, constraint.count, inputs, sim), constraint.tuples.world
 
 
-@_residuals.register(Boundary)
-def _of_boundary(constraint: Boundary, sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
+@_residuals.register(SolidBoundary)
+def _of_boundary(constraint: SolidBoundary, sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
     if not constraint.count:
         return None
     constraint.follow()

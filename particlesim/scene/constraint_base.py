@@ -62,6 +62,12 @@ class ConstraintBase(Part):
         """One sweep."""
         raise validate.undefined(self, "project(self, state, neighbors, dt)")
 
+    def go_on(self, count: Any, omega: Any) -> None:
+        """Positions went on as ``Settings.acceleration`` says: multipliers do so, too."""
+
+    def look(self, flag: Any, tolerance: float, dt: float) -> None:
+        """Set the flag if something is missed by more than ``Settings.constraint_tolerance``."""
+
     def finish(self, state: Any, neighbors: Any, dt: float) -> None:
         """After the velocities have followed and what met has bounced off: damping, breaking."""
 

@@ -40,6 +40,12 @@ class Settings:
             run that wants more warns of what does. None: with ``"adaptive"`` 10 000.
         iterations: Sweeps over the constraints a substep (XPBD). Compliant constraints do not
             depend on it; stiff ones come closer to C = 0.
+        constraint_tolerance: Sweeps end when no tuple is off by more, in parts of its extent (see
+            ``Diagnostics.constraint_error``), in any world of a batch; ``iterations`` is then how
+            many there are at most. None: that many.
+        acceleration: Each sweep over tuples goes on in the direction in which they come (Chebyshev;
+            Wang 2015), as for errors of which sweeps leave this part, rho, at least 0, below 1.
+            With fewer iterations than some 3 / sqrt(1 - rho) it does harm. 0: not at all.
         solver: How a sweep goes over the tuples of a constraint. ``"gauss_seidel"``: colour by
             colour, each from where the last one has left the particles; ``"jacobi"``: all at once,
             each particle split among its tuples: some sweeps more, but in no order.
@@ -98,6 +104,8 @@ class Settings:
     substeps: int | Any = 10  # or AUTO or ADAPTIVE
     most_substeps: int | None = None
     iterations: int = 1
+    constraint_tolerance: float | None = None
+    acceleration: float = 0.0
     solver: str = "gauss_seidel"
     bounce_iterations: int = 200
     integrator: str | type = "symplectic_euler"
@@ -150,6 +158,13 @@ class Settings:
         validate.choice(owner, "solver", self.solver, SOLVERS)
         validate.choice(owner, "execution", self.execution, EXECUTIONS)
         validate.choice(owner, "on_failure", self.on_failure, ON_FAILURE)
+        checked["acceleration"] = validate.number(
+            owner, "acceleration", self.acceleration, minimum=0.0, maximum=1.0 - 1e-9
+        )
+        if self.constraint_tolerance is not None:
+            checked["constraint_tolerance"] = validate.number(
+                owner, "constraint_tolerance", self.constraint_tolerance, above=0.0
+            )
         if self.skin is not None:
             checked["skin"] = validate.number(owner, "skin", self.skin, minimum=0.0, unit="length")
         if self.depenetration_speed is not None:

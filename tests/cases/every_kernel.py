@@ -167,6 +167,7 @@ def held():
                         thickness=0.1, velocity=(1, 0, 0), **touch),
         ps.SDFBoundary(np.ones((3, 3, 3)), (0, 0, 0), 5.0, **touch),
         ps.HeightfieldBoundary(np.zeros((3, 3)), (0, -20, 0), 5.0, **touch),
+        ps.SphereBoundary((0, 0, 0), 90.0, **touch) - ps.PlaneBoundary((0, -40, 0), (0, 1, 0)),
     ]  # fmt: skip
     for wall in walls:
         scene.add_constraint(wall)
@@ -177,8 +178,9 @@ def clustered():
     """A small cluster, and one of several chunks; all that they can do."""
     scene = particles()
     scene.add_constraint(
-        ps.ShapeMatching([range(6), range(6, 600)], 1.0, yield_strain=0.1, break_force=1.0)
+        ps.ShapeMatching([range(8), range(6, 600)], 1.0, yield_strain=0.1, break_force=1.0)
     )
+    scene.add_constraint(ps.Hinge(range(8), range(8, 16), (0, 0, 0), (0, 0, 1), break_force=1.0))
     return scene
 
 

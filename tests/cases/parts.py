@@ -21,7 +21,7 @@ PAIRS = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (6, 7)]
 TUPLES = {
     "pairs": PAIRS, "particles": PAIRS, "triples": [(0, 1, 3), (1, 3, 7), (4, 5, 7), (2, 6, 4)],
     "quadruples": [(0, 1, 3, 7), (5, 4, 6, 2), (0, 2, 6, 7)],
-    "clusters": [(0, 1, 3, 7, 2), (5, 4, 6, 2, 0)],
+    "clusters": [(0, 1, 3, 7, 2), (5, 4, 6, 2, 0)], "a": [(0, 1, 3, 7)], "b": [(5, 4, 6, 2)],
 }  # fmt: skip
 
 
@@ -116,6 +116,11 @@ QUANTITIES = {
     ("Coulomb", "damping"): Quantity(0.3, (-1, 0, 0)),
     ("SoftSphere", "sigma"): Quantity(1.6, (1, 0, 0)),
     "rest_angle": Quantity(1.9),
+    ("BallJoint", "point"): Quantity([(0.1, 0.2, 0.0)], (1, 0, 0), "point"),
+    ("Hinge", "point"): Quantity([(0.1, 0.2, 0.0)], (1, 0, 0), "point"),
+    "axis": Quantity([(0.3, 1, 0.2)], kind="axial"),
+    ("Hinge", "lower"): Quantity(-0.5),
+    ("Hinge", "upper"): Quantity(0.1),
     ("HarmonicAngles", "stiffness"): Quantity(3.0, (2, 1, -2)),
     ("SphereBoundary", "radius"): Quantity(1.9, (1, 0, 0)),
     ("Distance", "damping"): Quantity(0.5, (0, 1, -1)),
@@ -149,7 +154,8 @@ KIN = {
     "SoftSphere": "PairPotential", "Coulomb": "PairPotential", "Electrostatics": "PairPotential",
 }  # fmt: skip
 # To a grid, which rests in the frame that it is made in, and to groups of several fluids.
-BOUND = ("FieldForce", "SurfaceTension", "HeightfieldBoundary", "SDFBoundary")
+BOUND = ("FieldForce", "SurfaceTension", "HeightfieldBoundary", "SDFBoundary", "UnionBoundary",
+         "ComplementBoundary")  # fmt: skip
 
 
 NU = Quantity(0.1, (2, 0, -1))

@@ -125,7 +125,7 @@ def test_worlds_bounce_as_alone(device):
 
 
 def test_a_rigid_cluster_bounces_as_one(device):
-    """A block of one cluster, on a face and on an edge: it keeps its energy at e = 1, within 2 %."""
+    """A block of one cluster, on a face and on an edge, keeps its energy at e = 1 within 2 %."""
     for tilt in (0.0, 0.4):
         c, s = np.cos(tilt), np.sin(tilt)
         x = (CUBE - 0.1) @ np.array([(c, s, 0), (-s, c, 0), (0, 0, 1)])

@@ -39,6 +39,8 @@ PARTS = {
     ps.AdaptiveSmoothing: {"eta": 1.2, "largest": 1.0},
     ps.Angles: {"triples": [(0, 1, 2)], "law": wave, "level": 1.0},
     ps.ArtificialViscosity: {"alpha": 0.1, "beta": 0.2},
+    ps.BallJoint: {"a": [0, 1, 2], "b": [3, 4, 5], "point": (0, 0, 0), "compliance": 0.1,
+                   "break_force": 1.0},
     ps.Bonds: {"pairs": [(0, 1)], "law": pull, "strength": 1.0},
     ps.Boundary: {
         "law": above, "friction": 0.1, "restitution": 0.5, "velocity": (0, 1, 0),
@@ -76,6 +78,8 @@ PARTS = {
     ps.HeightfieldBoundary: {
         "heights": [(0, 1), (0, 2)], "lower": (0, 0, 0), "spacing": 0.5, "pivot": (0, 0, 0),
     },
+    ps.Hinge: {"a": [0, 1, 2], "b": [3, 4, 5], "point": (0, 0, 0), "axis": (0, 0, 1),
+               "lower": -0.5, "upper": 0.5, "compliance": 0.1, "break_force": 1.0},
     ps.IdealGas: {"gamma": 1.4},
     ps.Isothermal: {"sound_speed": 1.0},
     ps.Keyframes: {"times": [0.0, 1.0], "places": [(0, 0, 0), (0, 1, 0)],
@@ -114,14 +118,39 @@ PARTS = {
 }  # fmt: skip
 OPEN = {(ps.BoxBoundary, "lower"), (ps.BoxBoundary, "upper")}  # a side may be infinitely far
 NEVER = {
+    (ps.BallJoint, "break_force"),
     (ps.Constraint, "break_force"),
     (ps.Distance, "break_force"),
+    (ps.Hinge, "break_force"),
     (ps.ShapeMatching, "break_force"),
 }  # may be infinite: unbreakable
-INDICES = {"clusters", "pairs", "triangles", "triples", "quadruples", "particles"}
-SIGNED = {"velocity", "angular_velocity", "pivot", "drawn", "times", "places", "turns", "start",
-          "end", "vertices", "heights", "level", "strength", "flow", "force", "acceleration",
-          "point", "normal", "lower", "upper", "periodic", "G", "pressure"}  # fmt: skip
+INDICES = {"a", "b", "clusters", "pairs", "particles", "quadruples", "triangles", "triples"}
+SIGNED = {
+    "G",
+    "acceleration",
+    "angular_velocity",
+    "axis",
+    "drawn",
+    "end",
+    "flow",
+    "force",
+    "heights",
+    "level",
+    "lower",
+    "normal",
+    "periodic",
+    "pivot",
+    "places",
+    "point",
+    "pressure",
+    "start",
+    "strength",
+    "times",
+    "turns",
+    "upper",
+    "velocity",
+    "vertices",
+}
 
 
 def numbers_of(part):

@@ -8,7 +8,13 @@ from ...engine.bounces import ENOUGH, bounces_type
 from ...precision import register
 from ..boundary import friction_function
 from ..constraints import bodies_type, rounding_function
-from .meeting import Form, held_type, meeting_function, velocity_function
+from .meeting import (
+    Form,
+    held_type,
+    meeting_function,
+    touching_function,
+    velocity_function,
+)
 
 RESTING = (
     1.0e-3  # of the speed that the projection has taken: what comes slower is pressed, not hit
@@ -30,6 +36,7 @@ def start_bounce_kernel(form: Form, forces: bool) -> wp.Kernel:
     Bounces = bounces_type(precision)
     kept = rounding_function(precision, form.compensated)
     meet, velocity_of = meeting_function(form), velocity_function(form)
+    touching = touching_function(form)
 
     @register
     def start_boundary_bounce(
@@ -49,13 +56,14 @@ def start_bounce_kernel(form: Form, forces: bool) -> wp.Kernel:
                 v = velocity_of(x, b.v[i], w, h)
                 before = v - c * inverse_dt
                 v = v - h.pressed[k] * inverse_dt
+                _mu, restitution = touching(i, w, x, kept(i, b) - c, p, h)
                 if wp.static(forces):
                     before = before - f[i] * (b.w[i] * dt)
                 for a in range(wp.static(sides)):
                     came = -wp.dot(before, N[a])
                     pressed = wp.dot(c, N[a]) * inverse_dt
                     if back[a] > real(0.0) and came > wp.max(real(RESTING) * pressed, real(0.0)):
-                        target[a] = p.restitution * came
+                        target[a] = restitution * came
                         missing = target[a] - wp.dot(v, N[a])
                         if missing > real(ENOUGH) * target[a]:
                             bounces.again[w] = 1
@@ -83,6 +91,7 @@ def bounce_kernel(form: Form) -> wp.Kernel:
     Bounces = bounces_type(precision)
     kept, friction = rounding_function(precision, form.compensated), friction_function(precision)
     meet, velocity_of = meeting_function(form), velocity_function(form)
+    touching = touching_function(form)
 
     @register
     def bounce_boundary(
@@ -99,6 +108,7 @@ def bounce_kernel(form: Form) -> wp.Kernel:
         x = b.x[i]
         _back, N = meet(i, w, x, kept(i, b) - b.correction[i], h.slack[k], p, h)
         v = velocity_of(x, b.v[i], w, h)
+        mu, _restitution = touching(i, w, x, kept(i, b) - b.correction[i], p, h)
         sent = h.impulse[k]
         dv = vec3()
         for a in range(wp.static(sides)):
@@ -111,7 +121,7 @@ def bounce_kernel(form: Form) -> wp.Kernel:
                 dv = dv + n * push
                 if p.friction > real(0.0):
                     grip = h.grip[k]
-                    grip[a] = grip[a] + p.friction * push * dt
+                    grip[a] = grip[a] + mu * push * dt
                     if grip[a] > real(0.0):
                         taken = friction((v + dv) * dt, n, grip[a])
                         grip[a] = grip[a] - wp.length(taken)

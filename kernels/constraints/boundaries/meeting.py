@@ -20,6 +20,7 @@ class Form(NamedTuple):
         compensated: Positions come with what rounding has kept from them.
         moving: It has poses.
         tracked: The surface takes where the substep began, too.
+        touch: Friction and restitution by place (see ``combined``); None: they are the boundary's.
     """
 
     surface: wp.Function
@@ -29,6 +30,7 @@ class Form(NamedTuple):
     compensated: bool
     moving: bool
     tracked: bool
+    touch: wp.Function | None
 
 
 @functools.cache
@@ -63,7 +65,7 @@ def meeting_function(form: Form) -> wp.Function:
 
     The way back to each side, and the sides' normals (see ``boundary_shapes``).
     """
-    surface, sides, precision, params, _, moving, tracked = form
+    surface, sides, precision, params, _, moving, tracked, _ = form
     vec3, each, Held = precision.vec3, precision.vector(sides), held_type(precision, sides)
     frame = frame_functions(precision)
     inward, outward = frame.inward, frame.outward
@@ -84,6 +86,33 @@ def meeting_function(form: Form) -> wp.Function:
 
     # Emitted behind the surface, which may itself stand behind the gradient that it takes.
     return function(meet, after_gradients=True)
+
+
+@functools.cache
+def touching_function(form: Form) -> wp.Function:
+    """``touching(i, w, x, e, p, h) -> (mu, e)``: friction and restitution where i meets it."""
+    precision, params, touch = form.precision, form.params, form.touch
+    vec3, Held = precision.vec3, held_type(precision, form.sides)
+    inward, moving, tracked = frame_functions(precision).inward, form.moving, form.tracked
+    if touch is None:
+
+        def touching_one(i: int, w: int, x: vec3, e: vec3, p: params, h: Held):
+            return p.friction, p.restitution
+
+        return function(touching_one)
+
+    def touching(i: int, w: int, x: vec3, e: vec3, p: params, h: Held):
+        y = x
+        rest = e
+        if wp.static(moving):
+            y, rest = inward(y, rest, h.pose[w])
+        start = y
+        if wp.static(tracked):
+            start = h.start[i]
+        mu, e_n = touch(y, rest, start, p)
+        return mu, e_n
+
+    return function(touching, after_gradients=True)
 
 
 @functools.cache

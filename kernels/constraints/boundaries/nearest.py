@@ -83,8 +83,11 @@ def nearest_kernel(near: wp.Function, params: Any) -> wp.Kernel:
     vec3, real = precision.vec3, precision.scalar
 
     @functools.partial(register, cpu_only=True)
-    def measure_nearest(p: params, x: wp.array(dtype=vec3), d_out: wp.array(dtype=real)):
+    def measure_nearest(
+        parameters: wp.array(dtype=params), x: wp.array(dtype=vec3), d_out: wp.array(dtype=real)
+    ):
         k = wp.tid()
+        p = parameters[0]
         d, _n = near(x[k], vec3(), real(wp.static(FAR)), x[k], p)
         d_out[k] = d
 

@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from ...precision import Precision, function
+from ..boundary_shapes import normals_type
 
 
 @functools.cache
@@ -59,3 +60,26 @@ def cylinder_near(precision: Precision, params: Any) -> wp.Function:
         return d, n
 
     return function(near_cylinder)
+
+
+@functools.cache
+def cylinder_facing(precision: Precision, params: Any) -> wp.Function:
+    """From the inside the distances of the round side and of both ends (see ``walls``)."""
+    vec3, real = precision.vec3, precision.scalar
+    each, normals = precision.vector(3), normals_type(precision, 3)
+
+    def facing_cylinder(x: vec3, p: params):
+        y = x - p.center
+        along = wp.dot(y, p.axis)
+        across = y - p.axis * along
+        r = wp.length(across)
+        out = p.aside  # of the axis: any direction across it will do
+        if r > real(0.0):
+            out = across / r
+        N = normals()
+        N[0] = -out
+        N[1] = p.axis
+        N[2] = -p.axis
+        return each(p.radius - r, p.half + along, p.half - along), N
+
+    return function(facing_cylinder)

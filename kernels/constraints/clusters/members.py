@@ -82,6 +82,7 @@ def views(form: Form) -> SimpleNamespace:
     """How members are seen.
 
     - ``seen(i, k, origin, box, c, b)``: particle i from the origin of cluster k, its nearest image;
+    - ``rotation(k, c)``: as it was found last, at first none;
     - ``middle(k, c, b)``: about the centre of cluster k, where sums are small, and rounding too;
     - ``shape(k, c)``: from q_0 to q;
     - ``softness(k, inverse_dt, c)``: alpha~ = alpha / dt^2, and ``gone(k, c)``: it is broken.
@@ -111,10 +112,17 @@ def views(form: Form) -> SimpleNamespace:
 
     shape = function(shape)
 
+    def rotation(k: int, c: Clusters):
+        R = wp.identity(n=3, dtype=double)
+        if wp.length_sq(c.turn[k]) > double(0.5):
+            R = wp.quat_to_matrix(c.turn[k])
+        return R
+
+    rotation = function(rotation)
+
     def middle(k: int, c: Clusters, b: Bodies):
         e = c.begin[c.chunk[k]]
-        R = wp.quat_to_matrix(c.turn[k])
-        return exact(c.particle[e], b) - R * shape(k, c) * c.rest[e]
+        return exact(c.particle[e], b) - rotation(k, c) * shape(k, c) * c.rest[e]
 
     def softness(k: int, inverse_dt: wp.float64, c: Clusters):
         return c.softness[k] * inverse_dt * inverse_dt
@@ -127,5 +135,5 @@ def views(form: Form) -> SimpleNamespace:
 
     return SimpleNamespace(
         wide=wide, kept=kept, seen=function(seen), shape=shape, middle=function(middle),
-        softness=function(softness), gone=function(gone),
+        softness=function(softness), gone=function(gone), rotation=rotation,
     )  # fmt: skip

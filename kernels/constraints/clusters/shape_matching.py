@@ -57,7 +57,8 @@ def match_function(form: Form) -> wp.Function:
     that no torque is needed.
     """
     Clusters, Bodies, _ = types(form)
-    shape_of, middle = views(form).shape, views(form).middle
+    own = views(form)
+    shape_of, middle, rotation = own.shape, own.middle, own.rotation
 
     def match(k: int, fresh: int, alpha: wp.float64, c: Clusters, b: Bodies):
         s = Moments()
@@ -72,7 +73,7 @@ def match_function(form: Form) -> wp.Function:
         shape = shape_of(k, c)
         q = c.turn[k]
         # Else a rounded rest shape would push the cluster on in every substep.
-        centre = (s.r - wp.quat_to_matrix(q) * shape * c.bias[k]) / c.total[k]
+        centre = (s.r - rotation(k, c) * shape * c.bias[k]) / c.total[k]
         c.centre[k] = centre
         c.goal[k] = shape
         size = c.size[k]

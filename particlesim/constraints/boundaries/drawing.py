@@ -70,3 +70,28 @@ def nodes(lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     counts = 1 + np.ceil(CELLS * (upper - lower) / (upper - lower).max()).astype(int)
     axes = [np.linspace(*ends) for ends in zip(lower, upper, counts, strict=True)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3), counts
+
+
+def extent(shapes: list[dict[str, Any]]) -> tuple[np.ndarray, np.ndarray] | None:
+    """Corners of a box with some room around shapes, but for planes and open boxes; None: none."""
+    corners = [each for shape in shapes for each in _corners(shape) if np.isfinite(each).all()]
+    if not corners:
+        return None
+    lower, upper = np.min(corners, axis=0), np.max(corners, axis=0)
+    room = 0.05 * (upper - lower).max()
+    return lower - room, upper + room
+
+
+def _corners(shape: dict[str, Any]) -> list[np.ndarray]:
+    if shape["kind"] == "box":
+        return [shape["lower"], shape["upper"]]
+    if shape["kind"] == "sphere":
+        return [shape["center"] - shape["radius"], shape["center"] + shape["radius"]]
+    return list(shape["points"]) if shape["kind"] == "mesh" else []
+
+
+def turned_over(shape: dict[str, Any]) -> dict[str, Any]:
+    """A shape whose inside and outside are exchanged."""
+    if shape["kind"] == "plane":
+        return {**shape, "normal": -shape["normal"]}
+    return {**shape, "container": not shape.get("container", True)}

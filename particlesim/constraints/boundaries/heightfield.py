@@ -11,12 +11,12 @@ import warp as wp
 from ... import validate
 from ...kernels.constraints.boundaries import grids as kernels
 from ...kernels.precision import Precision
-from ..boundary import STILL
+from .combined import ShapedBoundary
 from .motion import Motion
-from .nearest import NearestBoundary
+from .solid import STILL
 
 
-class HeightfieldBoundary(NearestBoundary):
+class HeightfieldBoundary(ShapedBoundary):
     """What is above a surface of heights over a grid: ground.
 
     Each cell is two triangles, cut from node (i, j) to node (i + 1, j + 1). Particles are held off

@@ -13,14 +13,14 @@ from ...engine.model import Model
 from ...kernels.constraints.boundaries import mesh as kernels
 from ...kernels.precision import Precision
 from ...scene.group import select
-from ..boundary import STILL
+from .combined import ShapedBoundary
 from .motion import Motion
-from .nearest import NearestBoundary
+from .solid import STILL
 
 FLAT = 1e-12  # of the square of its longest side, below which a triangle has no area
 
 
-class MeshBoundary(NearestBoundary):
+class MeshBoundary(ShapedBoundary):
     """The outside of a closed mesh, its inside, or both sides of a sheet of triangles.
 
     Particles are held off from the nearest point of the triangles. None goes through one, however

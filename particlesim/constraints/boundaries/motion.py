@@ -13,7 +13,7 @@ from ... import validate
 from ...interactions.laws.arguments import Arguments
 from ...kernels.constraints.boundaries import paths as kernels
 from ...kernels.constraints.rigid_motion import pose_type
-from ...kernels.parameters import in_memory, parameter_types
+from ...kernels.parameters import by_name, parameter_types, structures
 from ...kernels.precision import FLOAT64, Precision, structure
 from ...scene.law import Law
 from ...scene.law import law as make_law
@@ -53,10 +53,7 @@ class Motion:
     def at(self, time: float, pivot: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The way, (3,), the turn about the pivot, (3, 3), and the velocity of that, (3,)."""
         Params, values = self.struct("cpu", pivot, 2.0**-20 * max(1.0, abs(time)))
-        host = np.zeros(1, dtype=Params.numpy_dtype())
-        for key, value in values.items():
-            host[key] = in_memory([value])
-        motion = wp.array(host, dtype=Params, device="cpu")
+        motion = structures(Params, by_name([values]), "cpu")
         clock = wp.array([time], dtype=wp.float64, device="cpu")
         pose = wp.zeros(1, dtype=pose_type(FLOAT64), device="cpu")
         wp.launch(self.kernel(FLOAT64, Params), 1, [0, motion, clock, pose], device="cpu")

@@ -11,13 +11,13 @@ from ... import validate
 from ...engine.limit import Limit
 from ...engine.probe import Probe
 from ...kernels.constraints.boundaries import nearest as kernels
-from ...kernels.parameters import parameter_types
+from ...kernels.parameters import by_name, parameter_types, structures
 from ...kernels.precision import FLOAT64, Precision, structure
-from ..boundary import Boundary
 from ..limits import crossing_limits
+from .solid import SolidBoundary
 
 
-class NearestBoundary(Boundary):
+class NearestBoundary(SolidBoundary):
     """Base of boundaries that know the nearest point of their surface, with its normal.
 
     A particle that touches several parts of the surface at once is brought back from one after the
@@ -25,14 +25,6 @@ class NearestBoundary(Boundary):
 
     A member gives ``near``, what that takes, and its ``shapes``.
     """
-
-    def near(self, precision: Precision, params: Any) -> wp.Function:
-        """The nearest point, as a Warp function (see kernels.constraints.boundaries.nearest)."""
-        raise validate.undefined(self, "near(self, precision, params)")
-
-    def width(self) -> float:
-        """How far a particle may go in a substep, so as not to pass it unseen [length]."""
-        return np.inf
 
     def distance(self, points: Any) -> np.ndarray:
         """The signed distance at points (n, 3) [length] of the boundary as described.
@@ -42,12 +34,8 @@ class NearestBoundary(Boundary):
         """
         x = validate.rows(f"{self.name}.distance", "points", points, None, 3)
         values = self._geometry("cpu", FLOAT64)
-        kinds = parameter_types(values, FLOAT64)
-        Params = structure(f"{type(self).__name__}Distance", kinds)
-        given = Params()
-        for name, value in values.items():
-            plain = isinstance(value, wp.array)
-            setattr(given, name, value if plain else kinds[name](value))
+        Params = structure(f"{type(self).__name__}Distance", parameter_types(values, FLOAT64))
+        given = structures(Params, by_name([values]), "cpu")
         kernel = kernels.nearest_kernel(self.near(FLOAT64, Params), Params)
         found = wp.empty(len(x), dtype=wp.float64, device="cpu")
         places = wp.array(x, dtype=wp.vec3d, device="cpu")

@@ -11,13 +11,13 @@ import warp as wp
 from ... import validate
 from ...kernels.constraints.boundaries import round as kernels
 from ...kernels.precision import Precision
-from ..boundary import STILL
+from .combined import ShapedBoundary
 from .drawing import revolved
 from .motion import Motion
-from .nearest import NearestBoundary
+from .solid import STILL
 
 
-class RoundBoundary(NearestBoundary):
+class RoundBoundary(ShapedBoundary):
     """Base of boundaries about the axis from ``start`` to ``end``; they turn about its middle."""
 
     def _round(self, start: Any, end: Any, radius: Any, inside: bool) -> None:
@@ -109,9 +109,10 @@ class CapsuleBoundary(RoundBoundary):
         return kernels.capsule_near(precision, params)
 
     def shapes(self) -> list[dict[str, Any]]:
-        angle = np.linspace(0.0, np.pi, 18)
-        z = -np.cos(angle) * self.radius + np.where(angle < 0.5 * np.pi, -self.half, self.half)
-        return self._drawn(np.stack([np.sin(angle) * self.radius, z], axis=1))
+        angle = np.linspace(0.0, 0.5 * np.pi, 13)
+        r, z = np.sin(angle) * self.radius, np.cos(angle) * self.radius + self.half
+        cap = np.stack([r, -z], axis=1)
+        return self._drawn(np.concatenate([cap, cap[::-1] * [1, -1]]))
 
 
 class CylinderBoundary(RoundBoundary):
@@ -157,9 +158,19 @@ class CylinderBoundary(RoundBoundary):
         self._holds(friction, restitution, group, velocity, angular_velocity, slip, motion)
         self._round(start, end, radius, inside)
         self.capped = bool(capped)
+        if self.inside and self.capped:
+            self.places = (0, 1, 1)
+
+    def kind(self) -> tuple[Any, ...]:
+        return (*super().kind(), self.places)
 
     def near(self, precision: Precision, params: Any) -> wp.Function:
         return kernels.cylinder_near(precision, params)
+
+    def facing(self, precision: Precision, params: Any) -> wp.Function:
+        if len(self.places) > 1:  # of a fluid in a corner both count
+            return kernels.cylinder_facing(precision, params)
+        return super().facing(precision, params)
 
     def _geometry(self, device: Any, precision: Precision) -> dict[str, Any]:
         half = self.half if self.capped else np.inf

@@ -13,13 +13,14 @@ from ...kernels.constraints.boundaries import grids as kernels
 from ...kernels.constraints.boundaries.volume import lookup_kernel
 from ...kernels.precision import Precision
 from ...scene.law import Law
-from ..boundary import STILL, Boundary
+from ..boundary import Boundary
+from .combined import ShapedBoundary
 from .drawing import level_set
 from .motion import Motion
-from .nearest import NearestBoundary
+from .solid import STILL
 
 
-class SDFBoundary(NearestBoundary):
+class SDFBoundary(ShapedBoundary):
     """What is where a sampled signed distance is positive.
 
     Between its nodes the distance is linear along each axis (trilinear), and the normal is its

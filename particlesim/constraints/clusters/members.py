@@ -21,7 +21,7 @@ CHUNK = 256  # members that one thread adds up
 PINNED = 1e4
 
 
-def checked(owner: str, value: Any) -> list[np.ndarray]:
+def checked(owner: str, value: Any, argument: str = "clusters") -> list[np.ndarray]:
     """``value`` as clusters: (k,) different indices each, of at least two particles."""
     try:
         if isinstance(value, str | Mapping):
@@ -33,21 +33,21 @@ def checked(owner: str, value: Any) -> list[np.ndarray]:
     for n, row in enumerate(rows):
         if row.ndim != 1 or (len(row) and not np.issubdtype(row.dtype, np.integer)):
             raise validate.fail(
-                owner, "clusters", "hold lists of particle indices", value,
+                owner, argument, "hold lists of particle indices", value,
                 "give one list for each cluster",
             )  # fmt: skip
         if len(row) < 2:
             raise validate.fail(
-                owner, f"clusters[{n}]", "hold at least 2 particles", row, "leave it out"
+                owner, f"{argument}[{n}]", "hold at least 2 particles", row, "leave it out"
             )
         if row.min() < 0:
             raise validate.fail(
-                owner, f"clusters[{n}]", "hold indices from 0 up", int(row.min()), "count from 0"
+                owner, f"{argument}[{n}]", "hold indices from 0 up", int(row.min()), "count from 0"
             )
         once, count = np.unique(row, return_counts=True)
         if len(once) < len(row):
             raise validate.fail(
-                owner, f"clusters[{n}]", "name different particles", int(once[count > 1][0]),
+                owner, f"{argument}[{n}]", "name different particles", int(once[count > 1][0]),
                 "leave out what is there twice",
             )  # fmt: skip
         found.append(row.astype(np.int64))
@@ -55,25 +55,29 @@ def checked(owner: str, value: Any) -> list[np.ndarray]:
 
 
 class Members:
-    """The clusters of the peers of a constraint, one peer a world.
+    """Clusters of all worlds.
 
     Row k of the arrays is cluster ``order[k]`` in the order in which the worlds list theirs. Those
     of one colour follow each other and share no particle: ``spans`` holds the first cluster and
     the one after the last, and the first chunk and the one after the last.
     """
 
-    def __init__(self, owner: str, model: Model, peers: Sequence[Any]):
+    def __init__(
+        self, owner: str, model: Model, clusters: Sequence[list[np.ndarray]],
+        shapes: Sequence[list[np.ndarray] | None], color: np.ndarray,
+    ):  # fmt: skip
         self.model = model
-        each = [row for peer in peers for row in peer.clusters]
-        lengths = [len(peer.clusters) for peer in peers]
+        each = [row for rows in clusters for row in rows]
+        lengths = [len(rows) for rows in clusters]
         self.count = len(each)
         self.edges = np.concatenate([[0], np.cumsum(lengths)]).astype(int)
-        color = np.concatenate([
-            np.zeros(0, dtype=np.int32), *(topology.colors(peer.clusters) for peer in peers)
-        ])  # fmt: skip
         self.order = np.argsort(color, kind="stable")
-        self.world = np.repeat(np.arange(len(peers)), lengths)[self.order]
-        rest = [row for w, peer in enumerate(peers) for row in _rest(owner, model, w, peer)]
+        self.world = np.repeat(np.arange(len(clusters)), lengths)[self.order]
+        rest = [
+            shape
+            for w, (rows, given) in enumerate(zip(clusters, shapes, strict=True))
+            for shape in _rest(owner, model, w, rows, given)
+        ]
         self.particles = [
             each[k] + model.offsets[w] for k, w in zip(self.order, self.world, strict=True)
         ]
@@ -88,13 +92,16 @@ class Members:
         """Weights, and rest shapes from their centres of mass."""
         mass = self.model.column("mass")
         self.held = self.model.column("pinned") > 0
-        self.weight, self.rest, self.mean = [], [], np.ones(self.count)
+        self.weight, self.rest, self.centre = [], [], []
+        self.mean = np.ones(self.count)
         for k, row in enumerate(self.particles):
             held = self.held[row]
             free = mass[row][~held]
             m = np.where(held, PINNED * free.sum() if len(free) else 1.0, mass[row])
-            q = rest[k] - m @ rest[k] / m.sum()
+            centre = m @ rest[k] / m.sum()
+            q = rest[k] - centre
             q -= m @ q / m.sum()  # what rounding has left of it
+            self.centre.append(centre)
             self.weight.append(m)
             self.rest.append(q)
             if len(free):
@@ -159,18 +166,26 @@ class Members:
         return np.array([(q * m[:, None]).T @ q for m, q in pairs]).reshape(-1, 3, 3)
 
 
-def _rest(owner: str, model: Model, w: int, peer: Any) -> list[np.ndarray]:
+def colors(each: Sequence[list[np.ndarray]]) -> np.ndarray:
+    """Colours of all worlds' clusters."""
+    found = [topology.colors(rows) for rows in each]
+    return np.concatenate([np.zeros(0, dtype=np.int32), *found])
+
+
+def _rest(
+    owner: str, model: Model, w: int, clusters: list[np.ndarray], given: list[np.ndarray] | None
+) -> list[np.ndarray]:
     """Rest shapes of the clusters of world w, by default as they are at the start."""
     scene, box = model.scenes[w], model.box_start[w]
     shapes = []
-    for n, row in enumerate(peer.clusters):
+    for n, row in enumerate(clusters):
         if row.max() >= scene.particle_count:
             raise validate.fail(
                 owner, f"clusters[{n}]", f"hold indices from 0 to {scene.particle_count - 1}",
                 int(row.max()), "index the scene's particles",
             )  # fmt: skip
-        if peer.rest is not None:
-            shapes.append(peer.rest[n])
+        if given is not None:
+            shapes.append(given[n])
         else:
             d = scene.position[row] - scene.position[row[0]]
             parts = np.divide(d, box, out=np.zeros_like(d), where=box > 0)

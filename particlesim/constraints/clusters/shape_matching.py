@@ -23,7 +23,7 @@ from ...kernels.constraints.clusters.shape_matching import project_kernels
 from ...scene.constraint_base import ConstraintBase
 from ...scene.part import Part
 from ..tuples import bodies
-from .members import Members, checked
+from .members import Members, checked, colors
 
 
 class ShapeMatching(ConstraintBase):
@@ -113,7 +113,9 @@ class ShapeMatching(ConstraintBase):
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
-        self.members = Members(self.name, model, self.peers)
+        clusters = [peer.clusters for peer in self.peers]
+        shapes = [peer.rest for peer in self.peers]
+        self.members = Members(self.name, model, clusters, shapes, colors(clusters))
         self.count = self.members.count
 
     def _column(self, name: str) -> np.ndarray:

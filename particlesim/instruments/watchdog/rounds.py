@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ...constraints.boundary import Boundary
+from ...constraints.boundaries.solid import SolidBoundary
 from ...constraints.constraint import Constraint
 from ...constraints.contact import Contact
 from ...engine.loop import Loop
@@ -186,14 +186,14 @@ def _unmet(constraint: Any, loop: Loop) -> list[tuple[np.ndarray, np.ndarray, st
     if isinstance(constraint, Constraint):
         found = off(constraint, loop)
         return [] if found is None else [(*found, "its particles' distance", UNMET)]
-    if not isinstance(constraint, Contact | Boundary):
+    if not isinstance(constraint, Contact | SolidBoundary):
         return []
     missed = residuals(constraint, loop)
     if missed is None:
         return []
     depth, world = missed
     slack = constraint.easing.slack.numpy()  # what a start overlaps by is called in slowly
-    if isinstance(constraint, Boundary):
+    if isinstance(constraint, SolidBoundary):
         rows = constraint.held.particle.numpy()
         depth = depth - slack.reshape(len(rows), -1).max(axis=1)
     else:

@@ -25,6 +25,11 @@ BOUNDARIES = {
     "box": lambda: [ps.BoxBoundary((0, 0, 0), (1, 2, 1))],
     "planes": lambda: [ps.PlaneBoundary((0, 0, 0), n) for n in CORNER],
     "sphere": lambda: [ps.SphereBoundary((0.3, 0.3, 0.3), 0.62)],
+    "cylinder": lambda: [ps.CylinderBoundary((0.3, 0, 0.3), (0.3, 1, 0.3), 0.44, inside=True)],
+    "capsule": lambda: [
+        ps.PlaneBoundary((0, 0, 0), (0, 1, 0)),
+        ps.CapsuleBoundary((-1, -0.3, 0), (2, -0.3, 0), 0.3),
+    ],
     "law": lambda: [
         ps.Boundary(tube, radius=1.0), ps.SphereBoundary((0.3, -1, 0.3), 1.05, inside=False)
     ],
@@ -55,7 +60,8 @@ def simulation(scene, precision="float64", device="cpu", **knobs):
 
 
 @pytest.mark.parametrize(
-    "kind", ["box", "law", *(pytest.param(k, marks=pytest.mark.slow) for k in ("planes", "sphere"))]
+    "kind",
+    [pytest.param(k, marks=[pytest.mark.slow] * (k not in ("box", "law"))) for k in BOUNDARIES],
 )
 def test_forces_are_minus_the_gradient_of_the_energy(kind):
     """Beside flat walls and curved ones, in corners and in the middle."""

@@ -1,0 +1,297 @@
+"""Joints between rigid clusters, and between one and the world: ball joints and hinges."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ... import validate
+from ...engine import topology
+from ...engine.execution.launch import launch
+from ...engine.limit import Limit
+from ...engine.model import Model
+from ...engine.neighbors.lists import Neighbors
+from ...engine.probe import Probe
+from ...engine.state import State
+from ...kernels.constraints.clusters import joints as kernels
+from ...kernels.constraints.clusters.members import Form
+from ...scene.constraint_base import ConstraintBase
+from ...scene.part import Part
+from ..tuples import bodies
+from .members import Members, checked
+
+
+class BallJoint(ConstraintBase):
+    """A point of one cluster and a point of another, or of the world, stay together.
+
+    Both points are those of the rotations that fit the clusters best, and an impulse at a point
+    moves all members of its cluster as the rigid body of their masses (Mueller et al. 2020, eqs. 2
+    to 9): the joint holds as well for a thousand members as for four. It acts on both sides at one
+    place, so that momentum and angular momentum are kept to round-off. What keeps the clusters
+    rigid is a :class:`~particlesim.constraints.clusters.shape_matching.ShapeMatching` of them.
+
+    Args:
+        a: Particle indices, or a Group, of the first cluster; a list of these for several joints.
+        b: The same of the second; None: the world.
+        point: Where they are joined at the start [length], (3,); (m, 3) for m joints.
+        compliance: Distance of the points over force [length / force], one or one a joint, at
+            least 0.
+        break_force: Force beyond which a joint is gone for good [force], one or one a joint, above
+            0; None: unbreakable.
+
+    Raises:
+        ValueError: Clusters of fewer than 2 particles, with one twice or out of range, or that
+            share particles; points that are no points; values out of range.
+
+    Example:
+        >>> from particlesim import Scene, sample
+        >>> scene = Scene()
+        >>> box = sample.box((0, 0, 0), (2, 2, 2), 1.0)
+        >>> left, right = scene.add_particles(box), scene.add_particles(box + (3, 0, 0))
+        >>> joint = scene.add_constraint(BallJoint(left, right, (2.0, 1.0, 1.0)))
+        >>> joint.point.tolist()
+        [[2.0, 1.0, 1.0]]
+    """
+
+    requires = frozenset({"position", "velocity", "inverse_mass", "correction"})
+    axis: np.ndarray | None = None
+    lower: np.ndarray
+    upper: np.ndarray
+
+    def __init__(
+        self, a: Any, b: Any, point: Any, *, compliance: Any = 0.0, break_force: Any = None
+    ):
+        name, one = self.name, np.ndim(point) == 1
+        where = [point] if one else point
+        self.point = validate.rows(name, "point", where, None, 3)
+        count = len(self.point)
+        self.a = self._side("a", [a] if one else a, count)
+        self.b = None if b is None else self._side("b", [b] if one else b, count)
+        for n, (left, right) in enumerate(zip(self.a, self.b or [], strict=False)):
+            shared = np.intersect1d(left, right)
+            if len(shared):
+                raise validate.fail(
+                    name, f"b[{n}]", "hold other particles than a", int(shared[0]),
+                    "leave it out of one of them",
+                )  # fmt: skip
+        self.compliance = topology.per_item(name, "compliance", compliance, count, minimum=0)
+        self.break_force = (
+            None
+            if break_force is None
+            else topology.limits(name, "break_force", break_force, count)
+        )
+
+    def _side(self, which: str, value: Any, count: int) -> list[np.ndarray]:
+        rows = checked(self.name, value, which)
+        if len(rows) != count:
+            raise validate.fail(
+                self.name, which, f"hold a cluster for each of {count} points", len(rows),
+                "give one list of indices for each",
+            )  # fmt: skip
+        return rows
+
+    @property
+    def sides(self) -> list[list[np.ndarray]]:
+        """The clusters, those of ``a`` and then those of ``b`` if it has them."""
+        return [self.a] if self.b is None else [self.a, self.b]
+
+    def kind(self) -> tuple[Any, ...]:
+        return type(self), self.b is None, self.break_force is None
+
+    # The engine's side ------------------------------------------------------------------------
+
+    def prepare(self, model: Model, neighbors: Neighbors) -> None:
+        self.model = model
+        each = [[row for side in peer.sides for row in side] for peer in self.peers]
+        none = np.zeros(sum(map(len, each)), dtype=np.int32)
+        shapes: list[None] = [None] * len(each)
+        self.members = Members(self.name, model, each, shapes, none)
+        lengths = [len(peer.point) for peer in self.peers]
+        self.count, self.edges = sum(lengths), np.concatenate([[0], np.cumsum(lengths)])
+        together = [
+            [np.concatenate(rows) for rows in zip(*peer.sides, strict=True)] for peer in self.peers
+        ]
+        color = np.concatenate([np.zeros(0, dtype=np.int32), *map(topology.colors, together)])
+        self.order = np.argsort(color, kind="stable")
+        self.worlds_joined = np.repeat(np.arange(len(lengths)), lengths)[self.order]
+        rows = np.bincount(color) if self.count else np.zeros(0, dtype=np.int64)
+        self.spans = list(itertools.pairwise([0, *np.cumsum(rows).tolist()]))
+
+    def _columns(self) -> dict[str, np.ndarray]:
+        """What joints are, in the order in which the worlds list them."""
+        members, model = self.members, self.model
+        found: dict[str, list[Any]] = {name: [] for name in ("a", "b", "q_a", "q_b")}
+        held = model.column("pinned") > 0
+        for w, peer in enumerate(self.peers):
+            count, first = len(peer.point), members.edges[w]
+            for n in range(count):
+                ends = [first + n, first + count + n if peer.b else -1]
+                for side, k in zip("ab", ends, strict=True):
+                    found[side].append(k)
+                    found[f"q_{side}"].append(self._place(w, k, peer.point[n]))
+        columns = {name: np.array(rows) for name, rows in found.items()}
+        free = np.array([float(not held[row].all()) for row in members.particles] + [0.0])
+        columns |= {"mobile_a": free[columns["a"]], "mobile_b": free[columns["b"]]}
+        return columns | self._angles()
+
+    def _place(self, w: int, k: int, point: np.ndarray) -> np.ndarray:
+        """A point from the centre of cluster k, as its nearest image; of the world, as it is."""
+        if k < 0:
+            return point
+        members, model = self.members, self.model
+        first = model.scenes[w].position[members.particles[k][0] - model.offsets[w]]
+        d, box = point - first - members.centre[k], model.box_start[w]
+        return d - box * np.round(np.divide(d, box, out=np.zeros(3), where=box > 0))
+
+    def _angles(self) -> dict[str, np.ndarray]:
+        """Axes, what is across them, and limits, of hinges."""
+        return {}
+
+    def attach(self, model: Model, state: State) -> None:
+        if not self.count:
+            return
+        columns = {**self._columns(), **self._values("compliance")}
+        if self.break_force is not None:
+            columns |= self._values("break_force", "limit")
+        self.bodies, self.struct = bodies(model, state), kernels.Joints()
+        for name, column in columns.items():
+            real = wp.vec3d if column.ndim == 2 else wp.float64
+            whole = column.dtype.kind == "i"
+            host = column[self.order].astype(np.int32 if whole else np.float64)
+            setattr(self.struct, name, model.array(host, wp.int32 if whole else real))
+        self.struct.lam = wp.zeros(self.count, dtype=wp.vec3d, device=model.device)
+        self.struct.broken = wp.zeros(self.count, dtype=wp.int32, device=model.device)
+        self.pull = wp.zeros(self.count, dtype=wp.float64, device=model.device)
+        nothing = np.zeros(self.members.count)
+        self.clusters = self.members.struct(nothing, nothing, False)
+        clusters = Form(model.precision, model.periodic, "position_error" in state, False, False)
+        form = kernels.JointForm(clusters, self.axis is not None)
+        self.project_kernel, self.fresh = kernels.project_kernel(form), True
+
+    def _values(self, name: str, field: str | None = None) -> dict[str, np.ndarray]:
+        return {field or name: np.concatenate([getattr(peer, name) for peer in self.peers])}
+
+    def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        self.fresh = True
+
+    def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        if not self.count or dt <= 0:
+            return
+        # Static projection: no time passes, and nothing moves of itself.
+        timed = not math.isinf(dt)
+        own, fresh = (dt if timed else 0.0), int(self.fresh)
+        self.fresh = False
+        for start, end in self.spans:
+            inputs = [start, fresh, own, 1.0 / dt, float(timed), self.model.box, self.struct,
+                      self.clusters, self.bodies]  # fmt: skip
+            launch(self.project_kernel, end - start, inputs, self.model.device)
+
+    def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        if self.count and dt > 0 and self.break_force is not None:
+            self._strain(1, dt)
+
+    def _strain(self, may_break: int, dt: float) -> None:
+        inputs = [may_break, self.struct, (1.0 / dt) ** 2, self.pull]
+        launch(kernels.strain_kernel(), self.count, inputs, self.model.device)
+
+    def limits(self, probe: Probe) -> list[Limit]:
+        """None: it is implicit."""
+        return (
+            [Limit(self.name, "damping in time", math.inf, "any: implicit")] if self.count else []
+        )
+
+    def persistent(self) -> dict[str, wp.array]:
+        if not self.count:
+            return {}
+        return {"turn": self.clusters.turn, "broken": self.struct.broken}
+
+    def readable(self) -> dict[str, wp.array]:
+        return {"lam": self.struct.lam} if self.count else {}
+
+    def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
+        return self.members.world if name == "turn" else self.worlds_joined
+
+    def reset(self, worlds: Sequence[int]) -> None:
+        self.forget({**self.persistent(), **self.readable()}, worlds)
+
+    # Reading ------------------------------------------------------------------------------------
+
+    def read_force(self, part: Part) -> np.ndarray:
+        """The force of each joint in the last substep."""
+        dt = self.model.settings.substep
+        if not self.count or not dt > 0:
+            return np.zeros(self.count)
+        self._strain(0, dt)
+        return self._listed(self.pull.numpy(), part)
+
+    def read_broken(self, part: Part) -> np.ndarray:
+        marks = self.struct.broken.numpy() if self.count else np.zeros(0)
+        return self._listed(marks, part) > 0
+
+    def _listed(self, rows: np.ndarray, part: Part) -> np.ndarray:
+        """Values of the sorted joints, of the worlds of ``part``, in the order it has them."""
+        values = np.empty_like(rows)
+        values[self.order] = rows
+        mine = [w for w, peer in enumerate(self.peers) if part is self or part is peer]
+        return np.concatenate([values[self.edges[w] : self.edges[w + 1]] for w in mine])
+
+
+class Hinge(BallJoint):
+    """A ball joint whose sides turn against each other about one axis only, within limits.
+
+    Args:
+        a: See :class:`BallJoint`. b: Likewise.
+        point: A point of the axis at the start [length], (3,); (m, 3) for m joints.
+        axis: Its direction at the start, (3,) or (m, 3), of any length above 0.
+        lower: Least angle of b against a, right-handed about the axis [rad], from -pi to 0, one
+            or one a joint; None: as far as it goes.
+        upper: Largest angle [rad], from 0 to pi, likewise.
+        compliance: See :class:`BallJoint`; the axes are rigid. break_force: Likewise.
+
+    Raises:
+        ValueError: As of BallJoint; an axis without a direction; limits out of range.
+
+    Example:
+        >>> Hinge([0, 1, 2], [3, 4, 5], (0, 0, 0), (0, 0, 1), lower=-0.5).upper.tolist()
+        [3.141592653589793]
+    """
+
+    def __init__(
+        self, a: Any, b: Any, point: Any, axis: Any, lower: Any = None, upper: Any = None, *,
+        compliance: Any = 0.0, break_force: Any = None,
+    ):  # fmt: skip
+        super().__init__(a, b, point, compliance=compliance, break_force=break_force)
+        name, count = self.name, len(self.point)
+        given = validate.rows(name, "axis", axis, count, 3)
+        largest = np.abs(given).max(axis=1, keepdims=True)
+        if count and not largest.min() > 0:
+            raise validate.fail(
+                name, f"axis[{int(np.argmin(largest))}]", "have a direction", given, "give one"
+            )
+        scaled = given / largest
+        self.axis = scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
+        self.lower = self._bound("lower", -math.pi if lower is None else lower, -math.pi, 0.0)
+        self.upper = self._bound("upper", math.pi if upper is None else upper, 0.0, math.pi)
+
+    def _bound(self, which: str, value: Any, least: float, most: float) -> np.ndarray:
+        bound = validate.rows(self.name, which, value, len(self.point), None)
+        good = (bound >= least) & (bound <= most)
+        if not good.all():
+            at = int(np.argmin(good))
+            raise validate.fail(
+                self.name, f"{which}[{at}]", f"be from {least:g} to {most:g} [rad]",
+                float(bound[at]), "count angles from the start",
+            )  # fmt: skip
+        return bound
+
+    def _angles(self) -> dict[str, np.ndarray]:
+        found = {**self._values("axis"), **self._values("lower"), **self._values("upper")}
+        axis = found["axis"]
+        side = np.eye(3)[np.argmin(np.abs(axis), axis=1)]
+        across = np.cross(axis, side)
+        return {**found, "arm": across / np.linalg.norm(across, axis=1, keepdims=True)}
