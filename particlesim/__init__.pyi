@@ -8,6 +8,7 @@ from .accuracy.tradeoff.table import Tradeoff
 from .accuracy.tune.report import Tuned
 from .accuracy.tune.tuning import tune
 from .constraints.bodies.body import Body
+from .constraints.bodies.scene import Scene
 from .constraints.boundaries.combined import ComplementBoundary, UnionBoundary
 from .constraints.boundaries.heightfield import HeightfieldBoundary
 from .constraints.boundaries.mesh import MeshBoundary
@@ -23,7 +24,6 @@ from .constraints.contact import Contact
 from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
 from .constraints.gradient import check_gradient
-from .constraints.scene import Scene
 from .engine.execution.launch import launch
 from .engine.integrators.integrator import Integrator
 from .instruments.correlations import (
