@@ -8,6 +8,7 @@ from .accuracy.tradeoff.table import Tradeoff
 from .accuracy.tune.report import Tuned
 from .accuracy.tune.tuning import tune
 from .constraints.bodies.body import Body
+from .constraints.bodies.scene import Scene
 from .constraints.boundaries.combined import ComplementBoundary, UnionBoundary
 from .constraints.boundaries.heightfield import HeightfieldBoundary
 from .constraints.boundaries.mesh import MeshBoundary

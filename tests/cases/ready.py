@@ -23,6 +23,7 @@ SMALL = {
     "polymer_melt": {"edge": 6},
     "polytrope": {"count": 300},
     "rain_on_cloth": {"spacing": 0.05},
+    "rigid_stack": {"boxes": 3},
     "rising_bubble": {"across": 12},
     "rope_bridge": {"planks": 12},
     "sedov_blast": {"side": 10},
@@ -32,6 +33,7 @@ SMALL = {
     "star_collision": {"count": 120},
     "taylor_green": {"count": 20},
     "toy_star": {"count": 250},
+    "wrecking_ball": {"rows": 3, "columns": 3},
 }
 
 # What others stand for in every run: sod_tube for gases with heat, dam_break for SPH with walls,
@@ -40,13 +42,14 @@ SMALL = {
 LONG = {
     "cantilever", "catenary", "cloth_drape", "elastic_rings", "elliptical_drop", "floating_block",
     "freezing", "galaxy_collision", "hydrostatic_tank", "molten_salt", "phase_transition",
-    "poiseuille", "polymer_melt", "polytrope", "rain_on_cloth", "rising_bubble", "rope_bridge",
-    "sedov_blast", "sloshing_tank", "standing_wave", "star_collision", "taylor_green", "toy_star",
+    "poiseuille", "polymer_melt", "polytrope", "rain_on_cloth", "rigid_stack", "rising_bubble",
+    "rope_bridge", "sedov_blast", "sloshing_tank", "standing_wave", "star_collision",
+    "taylor_green", "toy_star", "wrecking_ball",
 }  # fmt: skip
 # Whose kernels nobody shares, and take long to make: all that is done with them is for that run.
 LATER = {
-    "cantilever", "catenary", "cloth_drape", "floating_block", "poiseuille", "rising_bubble",
-    "rope_bridge", "sloshing_tank",
+    "cantilever", "catenary", "cloth_drape", "floating_block", "poiseuille", "rigid_stack",
+    "rising_bubble", "rope_bridge", "sloshing_tank", "wrecking_ball",
 }  # fmt: skip
 
 

@@ -64,8 +64,6 @@ def test_a_rectangle_covers_its_area_and_faces_where_it_says():
     assert (vertices.min(axis=0) == (1, 2, 3)).all() and (vertices.max(axis=0) == (4, 2, 5)).all()
     # Along both sides, and a diagonal a cell.
     assert len(sample.edges(triangles)) == 5 * 5 + 4 * 6 + 20
-    # All edges but those of the rim, 18, have a hinge.
-    assert len(sample.hinges(triangles)) == 69 - 18
     # Diagonals cross: inner vertices have four or eight edges, and none six.
     inner = np.bincount(sample.edges(triangles).ravel()).reshape(5, 6)[1:-1, 1:-1]
     assert set(inner.ravel()) == {4, 8}
@@ -77,19 +75,13 @@ def test_an_icosphere_is_closed_round_and_even(subdivisions):
     vertices, triangles = sample.icosphere(center, 2.0, subdivisions)
     assert len(vertices) == 10 * 4**subdivisions + 2 and len(triangles) == 20 * 4**subdivisions
     np.testing.assert_allclose(np.linalg.norm(vertices - center, axis=1), 2.0, atol=1e-12)
-    # Euler: 30 4^s edges, each a hinge.
-    assert len(sample.edges(triangles)) == len(sample.hinges(triangles)) == 30 * 4**subdivisions
+    assert len(sample.edges(triangles)) == 30 * 4**subdivisions  # Euler's V - E + F = 2
     if subdivisions == 0:  # the icosahedron's volume for its circumradius R: 2.5361507 R^3
         assert enclosed(vertices, triangles) == pytest.approx(2.5361507 * 8, rel=1e-7)
     else:  # chords of edge e lie e^2 / 8 R deeper: less than 3 e^2 / 8 R^2 of the volume is missing
         edge = np.ptp(vertices[sample.edges(triangles)], axis=1)
         depth = (edge**2).sum(axis=1).max() / 32
         assert 1 - 3 * depth < enclosed(vertices, triangles) / (4 / 3 * np.pi * 8) < 1
-
-
-def test_hinges_name_the_edge_and_the_corners_beside_it():
-    assert sample.hinges([(0, 1, 2)]).shape == (0, 4)
-    assert sample.hinges([(4, 9, 7), (9, 4, 2)]).tolist() == [[4, 9, 7, 2]]
 
 
 def test_points_are_inside_where_the_surface_winds_about_them():

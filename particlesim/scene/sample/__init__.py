@@ -18,7 +18,7 @@ from .distributions import maxwell_boltzmann, random, stretch, uniform_sphere
 from .enclosed import inside
 from .files import mesh
 from .filling import mesh_points, mesh_tetrahedra
-from .meshes import edges, hinges, icosphere, rectangle
+from .meshes import edges, icosphere, rectangle
 from .plummer import plummer, plummer_velocity
 from .shapes import box, cylinder, lattice, sphere
 from .solids import box_tetrahedra, surface
@@ -29,7 +29,6 @@ __all__ = [
     "curve",
     "cylinder",
     "edges",
-    "hinges",
     "icosphere",
     "inside",
     "lattice",

@@ -111,36 +111,6 @@ def edges(triangles: Any) -> np.ndarray:
     return np.unique(np.sort(_sides(index), axis=1), axis=0)
 
 
-def hinges(triangles: Any) -> np.ndarray:
-    """The edges that two triangles share, with what they bend between.
-
-    Args:
-        triangles: (t, 3) indices of vertices, all turning the same way round.
-
-    Returns:
-        (h, 4) indices: the ends of an edge, as the first of its triangles goes along it, the third
-        corner of that one and that of the other.
-
-    Raises:
-        ValueError: An edge that more than two triangles share, or two that turn opposite ways.
-
-    Example:
-        >>> hinges([(0, 1, 2), (2, 1, 3)]).tolist()
-        [[1, 2, 0, 3]]
-    """
-    owner = "sample.hinges"
-    index = _triangles(owner, triangles)
-    sides, third = _sides(index), index[:, [2, 0, 1]].reshape(-1)
-    _oriented(owner, sides)
-    where = {tuple(side): n for n, side in enumerate(sides.tolist())}
-    found = [
-        (p, q, third[n], third[where[q, p]])
-        for (p, q), n in where.items()
-        if p < q and (q, p) in where
-    ]
-    return np.array(found, dtype=np.int64).reshape(-1, 4)
-
-
 def closed(owner: str, vertices: Any, triangles: Any) -> tuple[np.ndarray, np.ndarray]:
     """Vertices and triangles that enclose a volume; what does not is refused."""
     corners = validate.rows(owner, "vertices", vertices, None, 3)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..interactions.filling import VISCOSITY, fill
-from ..interactions.fluid.smoothing import SmoothingFunction
-from ..interactions.fluid.sph import SPH
-from ..interactions.fluid.viscosities import Viscosity
-from ..scene import scene
-from .bodies.cloth import add_cloth
-from .bodies.rigid import add_rigid_body
-from .bodies.rope import add_rope
+from ...interactions.filling import VISCOSITY, fill
+from ...interactions.fluid.smoothing import SmoothingFunction
+from ...interactions.fluid.sph import SPH
+from ...interactions.fluid.viscosities import Viscosity
+from ...scene import scene
+from .cloth import add_cloth
+from .rigid import add_rigid_body
+from .rope import add_rope
 
 
 class Scene(scene.Scene):
