@@ -36,6 +36,10 @@ def wave(angle: float, level: float):
 # Arguments that each part can be made with.
 PARTS = {
     ps.AdaptiveSmoothing: {"eta": 1.2, "largest": 1.0},
+    ps.Angle: {"triples": [(0, 1, 2)], "rest_angle": 1.0, "compliance": 0.1, "damping": 0.1,
+               "break_force": 10.0},
+    ps.Area: {"triangles": [(0, 1, 2)], "rest_area": 1.0, "compliance": 0.1, "damping": 0.1,
+              "break_force": 10.0},
     ps.Angles: {"triples": [(0, 1, 2)], "law": wave, "level": 1.0},
     ps.ArtificialViscosity: {"alpha": 0.1, "beta": 0.2},
     ps.Bending: {"hinges": [(0, 1, 2, 3)], "rest_angle": 1.0, "compliance": 0.1, "damping": 0.1,
@@ -98,20 +102,26 @@ PARTS = {
     ps.SurfaceTension: {"fluid": FLUIDS, "coefficient": 1.0},
     ps.Tait: {"sound_speed": 10.0, "exponent": 7.0},
     ps.UniformGravity: {"acceleration": (0, -9.81, 0)},
+    ps.Volume: {"tetrahedra": [(0, 1, 2, 3)], "rest_volume": 1.0, "compliance": 0.1,
+                "damping": 0.1, "break_force": 10.0},
     ps.XSPH: {"epsilon": 0.5},
     ps.Yukawa: {"strength": 1.0, "screening": 1.0, "cutoff": 2.5},
 }  # fmt: skip
 OPEN = {(ps.BoxBoundary, "lower"), (ps.BoxBoundary, "upper")}  # a side may be infinitely far
 NEVER = {
+    (ps.Angle, "break_force"),
+    (ps.Area, "break_force"),
     (ps.Bending, "break_force"),
     (ps.Constraint, "break_force"),
     (ps.Distance, "break_force"),
     (ps.IsometricBending, "break_force"),
+    (ps.Volume, "break_force"),
 }  # may be infinite: unbreakable
-INDICES = {"hinges", "pairs", "triples", "quadruples", "particles"}
+INDICES = {"hinges", "pairs", "triples", "quadruples", "particles", "triangles", "tetrahedra"}
 SIGNED = {"velocity", "angular_velocity", "pivot", "drawn",
           "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
-          "periodic", "G", "pressure", (ps.Bending, "rest_angle")}  # fmt: skip
+          "periodic", "G", "pressure", (ps.Bending, "rest_angle"),
+          (ps.Volume, "rest_volume")}  # fmt: skip
 
 
 def numbers_of(part):
