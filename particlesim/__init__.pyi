@@ -24,8 +24,11 @@ from .constraints.contact import Contact
 from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
 from .constraints.gradient import check_gradient
+from .constraints.kinds.angle import Angle
+from .constraints.kinds.area import Area
 from .constraints.kinds.bending import Bending, hinges
 from .constraints.kinds.isometric_bending import IsometricBending
+from .constraints.kinds.volume import Volume
 from .constraints.scene import Scene
 from .engine.execution.launch import launch
 from .engine.integrators.integrator import Integrator
@@ -106,7 +109,9 @@ __all__ = [
     "SPH",
     "XSPH",
     "AdaptiveSmoothing",
+    "Angle",
     "Angles",
+    "Area",
     "ArtificialViscosity",
     "BallJoint",
     "Barostat",
@@ -203,6 +208,7 @@ __all__ = [
     "UsdRecorder",
     "VelocityRescaling",
     "Viscosity",
+    "Volume",
     "WendlandC2",
     "WendlandC4",
     "WendlandC6",
