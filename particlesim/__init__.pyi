@@ -29,7 +29,6 @@ from .constraints.kinds.area import Area
 from .constraints.kinds.bending import Bending, hinges
 from .constraints.kinds.isometric_bending import IsometricBending
 from .constraints.kinds.volume import Volume
-from .constraints.scene import Scene
 from .engine.execution.launch import launch
 from .engine.integrators.integrator import Integrator
 from .instruments.correlations import (

@@ -146,7 +146,8 @@ INDICES = {
 SIGNED = {
     "G", "acceleration", "angular_velocity", "axis", "drawn", "end", "flow", "force", "heights",
     "level", "lower", "normal", "periodic", "pivot", "places", "point", "pressure",
-    (ps.Bending, "rest_angle"), (ps.Volume, "rest_volume"), "start", "strength", "times", "turns", "upper", "velocity", "vertices",
+    (ps.Bending, "rest_angle"), (ps.Volume, "rest_volume"), "start", "strength", "times",
+    "turns", "upper", "velocity", "vertices",
 }  # fmt: skip
 
 
