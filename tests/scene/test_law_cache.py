@@ -46,6 +46,7 @@ ps.Simulation(scene, device="cpu").step()
 """
 
 
+@pytest.mark.slow
 def test_kernels_are_found_in_the_cache_again(tmp_path):
     # The second process makes the same functions in the opposite order.
     program = tmp_path / "program.py"
