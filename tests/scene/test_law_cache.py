@@ -6,6 +6,8 @@ import sys
 
 PROGRAM = """
 import sys
+
+import pytest
 import warp as wp
 import particlesim as ps
 
