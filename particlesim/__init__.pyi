@@ -10,6 +10,7 @@ from .accuracy.tune.tuning import tune
 from .constraints.boundary import Boundary
 from .constraints.boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
 from .constraints.clusters.joints import BallJoint, Hinge
+from .constraints.clusters.mesh_volume import MeshVolume
 from .constraints.clusters.shape_matching import ShapeMatching
 from .constraints.constraint import Constraint
 from .constraints.contact import Contact
@@ -140,6 +141,7 @@ __all__ = [
     "Ledger",
     "LennardJones",
     "Measured",
+    "MeshVolume",
     "Mie",
     "Morse",
     "MuellerViscosity",

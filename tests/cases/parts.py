@@ -22,6 +22,7 @@ TUPLES = {
     "pairs": PAIRS, "particles": PAIRS, "triples": [(0, 1, 3), (1, 3, 7), (4, 5, 7), (2, 6, 4)],
     "quadruples": [(0, 1, 3, 7), (5, 4, 6, 2), (0, 2, 6, 7)],
     "clusters": [(0, 1, 3, 7, 2), (5, 4, 6, 2, 0)], "a": [(0, 1, 3, 7)], "b": [(5, 4, 6, 2)],
+    "triangles": [(0, 3, 1), (0, 1, 4), (1, 3, 4), (3, 0, 4)],
 }  # fmt: skip
 
 
@@ -113,6 +114,9 @@ QUANTITIES = {
     "axis": Quantity([(0.3, 1, 0.2)], kind="axial"),
     ("Hinge", "lower"): Quantity(-0.5),
     ("Hinge", "upper"): Quantity(0.1),
+    ("MeshVolume", "pressure"): Quantity(1.2),
+    ("MeshVolume", "rest_volume"): Quantity(0.3, (3, 0, 0)),
+    ("MeshVolume", "compliance"): Quantity(0.05, (4, -1, 2)),
     ("HarmonicAngles", "stiffness"): Quantity(3.0, (2, 1, -2)),
     ("SphereBoundary", "radius"): Quantity(1.9, (1, 0, 0)),
     ("Distance", "damping"): Quantity(0.5, (0, 1, -1)),
@@ -132,11 +136,12 @@ PLAIN = {**TUPLES, "group": None, "exponents": (12, 6)}
 LEFT_OUT = {"break_force", "inequality", "tension_only", "truncation", "inside", "potential",
             "smoothing", "density", "dimension", "viscosity", "pivot", "drawn", "mixing", "groups",
             "exclude", "switch", "method", "tolerance", "slip", ("Electrostatics", "cutoff"),
-            "rest", "yield_strain", "creep", "largest_strain", ("Electrostatics", "damping"),
-            ("Gravity", "cutoff")}  # fmt: skip
+            "rest", "yield_strain", "creep", "largest_strain", "burst_pressure",
+            ("Electrostatics", "damping"), ("Gravity", "cutoff")}  # fmt: skip
 # What is of one machinery is tried by its kin in every run, and itself in the long one.
 KIN = {
-    "ElasticSolid": "Springs",
+    "ElasticSolid": "Springs", "BallJoint": "Constraint", "Hinge": "Constraint",
+    "MeshVolume": "Constraint", "ShapeMatching": "Constraint",
     "HarmonicBonds": "Springs", "FENEBonds": "Bonds", "HarmonicAngles": "Angles",
     "Mie": "LennardJones", "Yukawa": "PairPotential", "Morse": "PairPotential",
     "DFSPH": "SPH",

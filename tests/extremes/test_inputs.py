@@ -80,6 +80,8 @@ PARTS = {
     ps.LennardJones: {"epsilon": 1.0, "sigma": 1.0, "cutoff": 2.5},
     ps.GridField: {"lower": (0, 0, 0), "upper": (1, 1, 1), "spacing": 0.1, "speed": 1.0,
                    "density": 1.0, "damping": 0.1},
+    ps.MeshVolume: {"triangles": [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)], "pressure": 1.2,
+                    "rest_volume": 1.0, "compliance": 0.1, "burst_pressure": 1.0},
     ps.Mie: {"epsilon": 1.0, "sigma": 1.0, "cutoff": 2.5},
     ps.Morse: {"depth": 1.0, "steepness": 1.0, "distance": 1.0, "cutoff": 2.5},
     ps.PairForce: {"law": pull, "cutoff": 1.0, "strength": 1.0},
@@ -109,9 +111,10 @@ NEVER = {
     (ps.Constraint, "break_force"),
     (ps.Distance, "break_force"),
     (ps.Hinge, "break_force"),
+    (ps.MeshVolume, "burst_pressure"),
     (ps.ShapeMatching, "break_force"),
 }  # may be infinite: unbreakable
-INDICES = {"a", "b", "clusters", "pairs", "triples", "quadruples", "particles"}
+INDICES = {"a", "b", "clusters", "triangles", "pairs", "triples", "quadruples", "particles"}
 SIGNED = {"axis", "velocity", "angular_velocity", "pivot", "drawn",
           "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
           "periodic", "G", "pressure"}  # fmt: skip
