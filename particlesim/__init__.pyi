@@ -18,6 +18,7 @@ from .constraints.boundaries.sampled import SDFBoundary
 from .constraints.boundary import Boundary
 from .constraints.boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
 from .constraints.clusters.joints import BallJoint, Hinge
+from .constraints.clusters.mesh_volume import MeshVolume
 from .constraints.clusters.shape_matching import ShapeMatching
 from .constraints.constraint import Constraint
 from .constraints.contact import Contact
@@ -164,6 +165,7 @@ __all__ = [
     "LennardJones",
     "Measured",
     "MeshBoundary",
+    "MeshVolume",
     "Mie",
     "Morse",
     "MuellerViscosity",

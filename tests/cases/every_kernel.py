@@ -181,6 +181,8 @@ def clustered():
         ps.ShapeMatching([range(8), range(6, 600)], 1.0, yield_strain=0.1, break_force=1.0)
     )
     scene.add_constraint(ps.Hinge(range(8), range(8, 16), (0, 0, 0), (0, 0, 1), break_force=1.0))
+    tetrahedron = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
+    scene.add_constraint(ps.MeshVolume(tetrahedron, rest_volume=1.0, burst_pressure=1.0))
     return scene
 
 

@@ -22,7 +22,8 @@ TUPLES = {
     "pairs": PAIRS, "particles": PAIRS, "triples": [(0, 1, 3), (1, 3, 7), (4, 5, 7), (2, 6, 4)],
     "quadruples": [(0, 1, 3, 7), (5, 4, 6, 2), (0, 2, 6, 7)],
     "clusters": [(0, 1, 3, 7, 2), (5, 4, 6, 2, 0)], "a": [(0, 1, 3, 7)], "b": [(5, 4, 6, 2)],
-    "triangles": [(0, 1, 3), (4, 6, 7)], "tetrahedra": [(0, 1, 3, 7), (5, 2, 4, 0)],
+    "triangles": [(0, 3, 1), (0, 1, 4), (1, 3, 4), (3, 0, 4)],
+    "tetrahedra": [(0, 1, 3, 7), (5, 2, 4, 0)],
     "hinges": [(0, 1, 3, 7), (5, 4, 6, 2), (0, 2, 6, 7)],
 }  # fmt: skip
 
@@ -123,6 +124,9 @@ QUANTITIES = {
     "axis": Quantity([(0.3, 1, 0.2)], kind="axial"),
     ("Hinge", "lower"): Quantity(-0.5),
     ("Hinge", "upper"): Quantity(0.1),
+    ("MeshVolume", "pressure"): Quantity(1.2),
+    ("MeshVolume", "rest_volume"): Quantity(0.3, (3, 0, 0)),
+    ("MeshVolume", "compliance"): Quantity(0.05, (4, -1, 2)),
     ("HarmonicAngles", "stiffness"): Quantity(3.0, (2, 1, -2)),
     ("Bending", "rest_angle"): Quantity(0.7, kind="signed"),
     ("Bending", "compliance"): Quantity(0.3, (-2, -1, 2)),
@@ -153,15 +157,17 @@ LAWS = {
 }
 TETRAHEDRON = [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)]
 PLAIN = {**TUPLES, "triangles": TETRAHEDRON, "group": None, "exponents": (12, 6)}
-LEFT_OUT = {"break_force", "inequality", "tension_only", "truncation", "inside", "potential",
-            "smoothing", "density", "dimension", "viscosity", "pivot", "drawn", "mixing", "groups",
-            "exclude", "switch", "method", "tolerance", "slip", "capped", "sheet", "motion", "rest",
-            "yield_strain", "creep", "largest_strain", ("Electrostatics", "cutoff"),
-            ("Electrostatics", "damping"),
-            ("Gravity", "cutoff")}  # fmt: skip
+LEFT_OUT = {
+    "break_force", "inequality", "tension_only", "truncation", "inside", "potential", "smoothing",
+    "density", "dimension", "viscosity", "pivot", "drawn", "mixing", "groups", "exclude", "switch",
+    "method", "tolerance", "slip", "capped", "sheet", "motion", "rest", "yield_strain", "creep",
+    "largest_strain", ("Electrostatics", "cutoff"), ("Electrostatics", "damping"), ("Gravity",
+    "cutoff"), "burst_pressure",
+}  # fmt: skip
 # What is of one machinery is tried by its kin in every run, and itself in the long one.
 KIN = {
-    "ElasticSolid": "Springs",
+    "ElasticSolid": "Springs", "BallJoint": "Constraint", "Hinge": "Constraint",
+    "MeshVolume": "Constraint", "ShapeMatching": "Constraint",
     "HarmonicBonds": "Springs", "FENEBonds": "Bonds", "HarmonicAngles": "Angles",
     "Mie": "LennardJones", "Yukawa": "PairPotential", "Morse": "PairPotential",
     "CapsuleBoundary": "Boundary", "CylinderBoundary": "Boundary", "MeshBoundary": "Boundary",

@@ -100,6 +100,8 @@ PARTS = {
         "vertices": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], "triangles": TETRAHEDRON,
         "thickness": 0.1,
     },
+    ps.MeshVolume: {"triangles": [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)], "pressure": 1.2,
+                    "rest_volume": 1.0, "compliance": 0.1, "burst_pressure": 1.0},
     ps.Mie: {"epsilon": 1.0, "sigma": 1.0, "cutoff": 2.5},
     ps.Morse: {"depth": 1.0, "steepness": 1.0, "distance": 1.0, "cutoff": 2.5},
     ps.PairForce: {"law": pull, "cutoff": 1.0, "strength": 1.0},
@@ -136,6 +138,7 @@ NEVER = {
     (ps.Distance, "break_force"),
     (ps.Hinge, "break_force"),
     (ps.IsometricBending, "break_force"),
+    (ps.MeshVolume, "burst_pressure"),
     (ps.ShapeMatching, "break_force"),
     (ps.Volume, "break_force"),
 }  # may be infinite: unbreakable

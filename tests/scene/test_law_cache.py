@@ -4,10 +4,11 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 PROGRAM = """
 import sys
 
-import pytest
 import warp as wp
 import particlesim as ps
 

@@ -147,6 +147,13 @@ class Members:
             result.broken = wp.zeros(self.count, dtype=wp.int32, device=device)
         return result
 
+    def listed(self, rows: np.ndarray, part: Any, bound: Any) -> np.ndarray:
+        """Values of the sorted clusters, of the worlds of ``part``, in the order it has them."""
+        values = np.empty_like(rows)
+        values[self.order] = rows
+        mine = [w for w, peer in enumerate(bound.peers) if part is bound or part is peer]
+        return np.concatenate([values[self.edges[w] : self.edges[w + 1]] for w in mine])
+
     def sizes(self) -> np.ndarray:
         """sum m q^2 of each cluster, over the members that are free, if any are."""
         free = [~self.held[row] for row in self.particles]

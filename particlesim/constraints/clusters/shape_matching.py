@@ -251,16 +251,9 @@ class ShapeMatching(ConstraintBase):
         if not self.count or not dt > 0:
             return np.zeros(self.count)
         self._strain(0, dt)
-        return self._listed(self.largest.numpy(), part)
+        return self.members.listed(self.largest.numpy(), part, self)
 
     def read_broken(self, part: Part) -> np.ndarray:
-        if self.count and self.form.breakable:
-            return self._listed(self.struct.broken.numpy(), part) > 0
-        return self._listed(np.zeros(self.count), part) > 0
-
-    def _listed(self, rows: np.ndarray, part: Part) -> np.ndarray:
-        """Values of the sorted clusters, of the worlds of ``part``, in the order it has them."""
-        values, edges = np.empty_like(rows), self.members.edges
-        values[self.members.order] = rows
-        mine = [w for w, peer in enumerate(self.peers) if part is self or part is peer]
-        return np.concatenate([values[edges[w] : edges[w + 1]] for w in mine])
+        known = self.count and self.form.breakable
+        marks = self.struct.broken.numpy() if known else np.zeros(self.count)
+        return self.members.listed(marks, part, self) > 0
