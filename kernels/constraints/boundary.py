@@ -115,6 +115,21 @@ def begin_kernel(form: Form) -> wp.Kernel:
 
 
 @functools.cache
+def track_kernel(form: Form) -> wp.Kernel:
+    """Kernel: outside of time particles have come from where they are."""
+    params, Bodies = form.params, bodies_type(form.precision)
+    Held, seen = held_type(form.precision, form.sides), seen_function(form)
+
+    @register
+    def track_start(first: int, parameters: wp.array(dtype=params), h: Held, b: Bodies):
+        k = first + wp.tid()
+        i = h.particle[k]
+        h.start[i] = seen(b.x[i], h.world[k], h)
+
+    return track_start
+
+
+@functools.cache
 def project_kernel(form: Form) -> wp.Kernel:
     """Kernel: particles are brought back to where they may be, and held along it."""
     sides, precision, params, compensated = form[1:5]

@@ -181,6 +181,8 @@ class Holding(EasedConstraint):
         if dt < math.inf:
             self._launch(self.begin_kernel, self.easing.struct, dt)
             call(self.easing.unmark)
+        elif self.tracked:
+            self._launch(kernels.track_kernel(self.form))
 
     def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if self.count and dt > 0:

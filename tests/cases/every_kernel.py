@@ -152,7 +152,10 @@ def constrained(periodic, *, breaks, bounces):
         scene.add_interaction(ps.DFSPH(smoothing_length=1.0, rest_density=1.0))
         scene.add_constraint(ps.PlaneBoundary((0, -9, 0), (0, 1, 0), **touch))
         scene.add_constraint(ps.BoxBoundary((-9, -9, -9), (20, 20, 20), **touch))
-        scene.add_constraint(ps.SphereBoundary((0, 0, 0), 30.0, motion=KEYS, **touch))
+        sheet = [(0, -9, 0), (9, -9, 0), (0, -9, 9)], [(0, 1, 2)]
+        scene.add_constraint(
+            ps.MeshBoundary(*sheet, sheet=True, thickness=0.1, motion=KEYS, **touch)
+        )
     return scene
 
 
@@ -163,8 +166,7 @@ def held():
     walls = [
         ps.CapsuleBoundary((0, -50, 0), (0, -50, 5), 30.0, **touch),
         ps.CylinderBoundary((0, 0, 0), (0, 0, 30), 60.0, True, motion=KEYS, **touch),
-        ps.MeshBoundary([(0, -9, 0), (9, -9, 0), (0, -9, 9)], [(0, 1, 2)], sheet=True,
-                        thickness=0.1, velocity=(1, 0, 0), **touch),
+        ps.SphereBoundary((0, 0, 0), 60.0, velocity=(1, 0, 0), **touch),
         ps.SDFBoundary(np.ones((3, 3, 3)), (0, 0, 0), 5.0, **touch),
         ps.HeightfieldBoundary(np.zeros((3, 3)), (0, -20, 0), 5.0, **touch),
         ps.SphereBoundary((0, 0, 0), 90.0, **touch) - ps.PlaneBoundary((0, -40, 0), (0, 1, 0)),

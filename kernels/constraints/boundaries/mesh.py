@@ -13,6 +13,8 @@ import warp as wp
 from ...precision import Precision, function
 from .triangle import triangle_function
 
+ON = 1.0e-3  # of how far it was, below which a place is on the surface, and rounding is its side
+
 
 @functools.cache
 def corners_function(precision: Precision, params: Any) -> wp.Function:
@@ -73,29 +75,36 @@ def apart_function(precision: Precision, params: Any) -> wp.Function:
 
 @functools.cache
 def found_function(precision: Precision, params: Any) -> wp.Function:
-    """``found(y, reach, p) -> (face, outer)``: the nearest triangle, -1 if there is none in reach.
+    """``found(y, reach, deep, p) -> (face, outer)``: the nearest triangle, -1 if none is in reach.
 
-    ``outer`` is 1 where particles may be, and else -1.
+    ``outer`` is 1 where particles may be, and else -1. By the winding number that is known however
+    ``deep`` the place is, and costs ten times as much as by the normals of what is near.
     """
     vec3, real = precision.vec3, precision.scalar
 
-    def found(y: vec3, reach: real, p: params):
+    def found(y: vec3, reach: real, deep: bool, p: params):
         at = wp.vec3(y * p.inverse_unit)
+        # A little farther, as single precision may see it farther off.
+        limit = wp.min(reach * p.inverse_unit * real(1.001), real(1.0e6))
+        far = float(limit) + 1.0e-6
         face = int(-1)
         outer = real(1.0)
         if p.sheet != 0:
-            # A little farther, as single precision may see it farther off.
-            far = wp.min(reach * p.inverse_unit * real(1.001), real(1.0e6))
-            near = wp.mesh_query_point_no_sign(p.mesh, at, float(far) + 1.0e-6)
+            near = wp.mesh_query_point_no_sign(p.mesh, at, far)
             if near.result:
                 face = near.face
+        elif deep:
+            wound = wp.mesh_query_point_sign_winding_number(p.mesh, at, 1.0e6)
+            if wound.result:
+                face = wound.face
+                outer = real(wound.sign)
         else:
-            signed = wp.mesh_query_point_sign_winding_number(p.mesh, at, 1.0e6)
+            signed = wp.mesh_query_point_sign_normal(p.mesh, at, far)
             if signed.result:
                 face = signed.face
                 outer = real(signed.sign)
-                if p.inside != 0:
-                    outer = -outer
+        if p.inside != 0:
+            outer = -outer
         return face, outer
 
     return function(found)
@@ -113,13 +122,14 @@ def side_function(precision: Precision, params: Any) -> wp.Function:
         r = wp.length(y - q)
         if p.sheet != 0:
             ahead = wp.dot(y - q, n)
-            if ahead == real(0.0):
-                ahead = wp.dot(z - q, n)
+            before = wp.dot(z - q, n)
+            if wp.abs(ahead) < real(wp.static(ON)) * wp.abs(before):
+                ahead = before
             n = n * wp.where(ahead < real(0.0), real(-1.0), real(1.0))
         elif p.inside != 0:
             n = -n
         d = wp.dot(y - q, n)
-        if within == 0 and r > real(0.0):
+        if within == 0 and r > real(wp.static(ON)) * wp.length(z - q):
             n = (y - q) * (outer / r)
             d = outer * r
         return d, n
@@ -142,12 +152,16 @@ def mesh_near(precision: Precision, params: Any) -> wp.Function:
         y = x - p.center + e
         z = s - p.center
         # Twice as far, so that what has just been let go of is still seen.
-        reach = real(2.0) * wp.max(wp.abs(R) + p.thickness, wp.length(y - z))
+        way = wp.length(y - z)
+        reach = real(2.0) * wp.max(wp.abs(R) + p.thickness, way)
         gap = apart(y, p)
         n = vec3(real(0.0), real(1.0), real(0.0))
         d = gap
         if gap <= reach or p.inside != 0:
-            face, outer = found(y, reach, p)
+            # What has gone nowhere may be anywhere, and what is in the solid from the start has an
+            # R below 0; all else can be in the solid by the way of a substep alone.
+            deep = way == real(0.0) or R < real(0.0)
+            face, outer = found(y, reach, deep, p)
             d = reach
             if face >= 0:
                 d, n = side(face, outer, y, z, p)

@@ -14,6 +14,7 @@ import warp as wp
 from ...precision import FLOAT64, Precision, function, register
 from ..boundary_shapes import normals_type
 
+OPPOSITE = -0.9  # cosine of normals, below which two sides face each other
 FAR = 1.0e30  # asks for the distance wherever it is
 
 
@@ -43,10 +44,15 @@ def nearest_sides(
                 if wp.isnan(d):  # none of the particle, for the watchdog to find
                     way = real(1.0)
                     n = vec3(d)
+                going = way > real(0.0)
+                if wp.static(a > 0):
+                    # Between two sides without room for it the middle is right.
+                    if wp.dot(n, N[wp.static(max(a - 1, 0))]) < real(wp.static(OPPOSITE)):
+                        way = real(0.5) * way
+                        going = False
                 back[a] = way
                 N[a] = n
                 at = at + n * way
-                going = way > real(0.0)
             else:
                 N[a] = N[wp.max(a - 1, 0)]
         return back, N

@@ -25,8 +25,8 @@ class MeshBoundary(ShapedBoundary):
 
     Particles are held off from the nearest point of the triangles. None goes through one, however
     fast: the way from where its substep began is followed. What is in the solid from the start is
-    brought out to the nearest point. Inside and outside are told by the winding number (Jacobson et
-    al. 2013), so that a mesh may consist of several closed parts, also overlapping ones.
+    brought out to the nearest point. That is told by the winding number (Jacobson et al. 2013), so
+    that an obstacle may consist of several closed parts, also overlapping ones.
 
     Triangles are looked for in single precision, relative to the middle of the mesh and in units of
     its size, and then measured in that of the simulation. So far from the origin, places are as

@@ -49,6 +49,7 @@ def test_what_is_held_is_off_by_the_radius(precision, device, simulate, scene_of
         assert (solid.distance(sim.position) - radius).min() > -1e-5
 
 
+@pytest.mark.slow
 def test_each_part_has_its_own_friction(device, simulate, scene_of):
     """On a table of two materials one grain slides and stops, and another goes on as on ice."""
     rough = ~ps.BoxBoundary((-50, -1, -50), (0, 0, 50), friction=0.5)

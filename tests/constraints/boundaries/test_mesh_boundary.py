@@ -18,7 +18,7 @@ def cube_distance(x):
     return np.linalg.norm(np.maximum(q, 0), axis=1) + np.minimum(q.max(axis=1), 0)
 
 
-@pytest.mark.parametrize("inside", [True, False])
+@pytest.mark.parametrize("inside", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_distance_of_a_cube(inside):
     """Exact in float64, from either side and however its triangles go round."""
     x, aside = np.random.default_rng(0).uniform(-2, 2, (2000, 3)), np.array([5, 0, 0])
@@ -28,6 +28,7 @@ def test_distance_of_a_cube(inside):
         assert np.allclose(found, cube_distance(x) * (-1 if inside else 1), atol=1e-14)
 
 
+@pytest.mark.parametrize("precision", ["float32", pytest.param("float64", marks=pytest.mark.slow)])
 def test_projection_out_of_a_cube(precision, device, simulate, scene_of):
     """From outside to R off the nearest point, also 10 km from the origin; what is off stays."""
     rng = np.random.default_rng(0)
@@ -115,6 +116,45 @@ def test_nothing_goes_through_a_thin_wall(device, simulate, scene_of):
     sim = simulate(scene_of(x, plate, velocity=v, radius=0.01), device)
     sim.run(3)
     assert sim.position[0, 1] == pytest.approx(0.0105, abs=1e-12)
+
+
+@pytest.mark.slow
+def test_a_projection_outside_of_time(device, simulate, scene_of):
+    """Particles written to the other side of a sheet are not brought back through it."""
+    sheet = ps.MeshBoundary(*SQUARE, sheet=True)
+    sim = simulate(scene_of([(0, 0.2, 0)], sheet, radius=0.05), device)
+    sim.run(2)
+    sim.position = [(0.3, -0.01, 0.1)]
+    sim.project(1)
+    assert sim.position[0] == pytest.approx([0.3, -0.05, 0.1], abs=1e-12)
+    sim.run(2)
+    assert sim.position[0, 1] == pytest.approx(-0.05, abs=1e-12)
+
+
+@pytest.mark.slow
+def test_where_there_is_no_room_the_middle_is_right(device, simulate, scene_of):
+    channel = ps.MeshBoundary(CORNERS * [1, 0.05, 1], CUBE, inside=True)
+    sim = simulate(scene_of([(0.3, 0.02, 0.2)], channel, radius=0.1, gravity=True), device)
+    sim.run(100)
+    assert sim.position[0] == pytest.approx([0.3, 0, 0.2], abs=2e-3)
+    assert np.abs(sim.velocity).max() < 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("inside", [False, True])
+def test_what_starts_in_the_solid_is_brought_out(inside, device, simulate, scene_of):
+    """Slowly, to the nearest point; overlapping obstacles are one solid."""
+    both = np.concatenate([CORNERS, CORNERS + np.array([0.8, 0.1, 0.0])])
+    corners, faces = (CORNERS, CUBE) if inside else (both, [*CUBE, *(np.array(CUBE) + 8)])
+    mesh = ps.MeshBoundary(corners, faces, inside)
+    x = [(2.5, 0.3, 0.2)] if inside else [(0.2, 0.7, 0.1), (-0.9, 0.1, 0.2), (1.75, 0.3, 0.1)]
+    sim = simulate(scene_of(x, mesh, radius=0.1), device, substeps=2)
+    fastest = 0.0
+    for _ in range(1500):
+        sim.step()
+        fastest = max(fastest, float(np.abs(sim.velocity).max()))
+    assert mesh.distance(sim.position).min() > 0.1 - 1e-6
+    assert fastest < 11  # a radius a frame of 0.01 at most
 
 
 @pytest.mark.slow
