@@ -22,10 +22,10 @@ from ..kernels.constraints.constraint_force import virial_kernel
 from ..scene.law import law as make_law
 from .force import ConstraintForce
 from .limits import constraint_limits
-from .reading import ReadTuples
-from .solvers import SOLVERS
+from .solving.reading import ReadTuples
+from .solving.solvers import SOLVERS
+from .solving.velocities import TupleVelocities
 from .tuples import Tuples, bodies
-from .velocities import TupleVelocities
 
 OWN = ("compliance", "damping", "break_force")  # parameters of every constraint
 

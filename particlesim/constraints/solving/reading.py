@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ..scene.constraint_base import ConstraintBase
-from ..scene.part import Part
+from ...scene.constraint_base import ConstraintBase
+from ...scene.part import Part
 
 
 class ReadTuples(ConstraintBase):

@@ -6,11 +6,11 @@ from typing import Any
 
 import warp as wp
 
-from ..engine.execution.copies import zero
-from ..engine.execution.launch import launch
-from ..engine.integrators import method
-from ..kernels.constraints.constraints import Solved
-from ..kernels.constraints.tuple_velocities import bounce_kernel, damp_kernel, straighten_kernel
+from ...engine.execution.copies import zero
+from ...engine.execution.launch import launch
+from ...engine.integrators import method
+from ...kernels.constraints.constraints import Solved
+from ...kernels.constraints.tuple_velocities import bounce_kernel, damp_kernel, straighten_kernel
 
 
 class TupleVelocities:
