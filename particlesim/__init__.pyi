@@ -24,6 +24,9 @@ from .constraints.contact import Contact
 from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
 from .constraints.gradient import check_gradient
+from .constraints.kinds.bending import Bending, hinges
+from .constraints.kinds.isometric_bending import IsometricBending
+from .constraints.scene import Scene
 from .engine.execution.launch import launch
 from .engine.integrators.integrator import Integrator
 from .instruments.correlations import (
@@ -107,6 +110,7 @@ __all__ = [
     "ArtificialViscosity",
     "BallJoint",
     "Barostat",
+    "Bending",
     "Body",
     "Bonds",
     "Boundary",
@@ -146,6 +150,7 @@ __all__ = [
     "Incident",
     "Integrator",
     "Interaction",
+    "IsometricBending",
     "Isothermal",
     "Keyframes",
     "LaminarViscosity",
@@ -204,6 +209,7 @@ __all__ = [
     "Yukawa",
     "__version__",
     "check_gradient",
+    "hinges",
     "launch",
     "law",
     "mean_square_displacement",

@@ -7,7 +7,7 @@ import warp as wp
 from ..constraints.boundaries.meeting import Form, held_type, meeting_function
 from ..constraints.constraint_force import counted_function
 from ..constraints.constraints import Solved, bodies_type, rounding_function, view_function
-from ..constraints.unmet import lack_function, off_function
+from ..constraints.solving.unmet import lack_function, off_function
 from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
 from ..precision import Precision, register
 

@@ -14,7 +14,8 @@ import numpy as np
 class Quantity:
     """A number or vector with its dimensions.
 
-    dimensions: powers of length, mass and time. kind: ``"number"``; ``"vector"``, which turns;
+    dimensions: powers of length, mass and time. kind: ``"number"``; ``"signed"``, a number whose
+    sign a mirror changes; ``"vector"``, which turns;
     ``"axial"``, which turns and keeps its sign where a mirror would change it; ``"velocity"``, to
     which a boost is added; ``"point"``, which is shifted; ``"corner"`` of a box along the axes.
     """
@@ -44,7 +45,9 @@ class Frame:
         """The quantity as this observer writes it."""
         value = np.asarray(quantity.value, dtype=float)
         scaled = value * self.scale(quantity.dimensions)
-        if quantity.kind == "number":
+        if quantity.kind in ("number", "signed"):
+            if quantity.kind == "signed":
+                scaled = scaled * np.sign(np.linalg.det(self.turn))
             return scaled.item() if scaled.ndim == 0 else scaled
         turned = scaled @ self.turn.T
         if quantity.kind == "axial":

@@ -22,6 +22,7 @@ TUPLES = {
     "pairs": PAIRS, "particles": PAIRS, "triples": [(0, 1, 3), (1, 3, 7), (4, 5, 7), (2, 6, 4)],
     "quadruples": [(0, 1, 3, 7), (5, 4, 6, 2), (0, 2, 6, 7)],
     "clusters": [(0, 1, 3, 7, 2), (5, 4, 6, 2, 0)], "a": [(0, 1, 3, 7)], "b": [(5, 4, 6, 2)],
+    "hinges": [(0, 1, 3, 7), (5, 4, 6, 2), (0, 2, 6, 7)],
 }  # fmt: skip
 
 
@@ -122,6 +123,11 @@ QUANTITIES = {
     ("Hinge", "lower"): Quantity(-0.5),
     ("Hinge", "upper"): Quantity(0.1),
     ("HarmonicAngles", "stiffness"): Quantity(3.0, (2, 1, -2)),
+    ("Bending", "rest_angle"): Quantity(0.7, kind="signed"),
+    ("Bending", "compliance"): Quantity(0.3, (-2, -1, 2)),
+    ("Bending", "damping"): Quantity(0.2, (2, 1, -1)),
+    ("IsometricBending", "compliance"): Quantity(0.3, (-2, -1, 2)),
+    ("IsometricBending", "damping"): Quantity(0.2, (2, 1, -1)),
     ("SphereBoundary", "radius"): Quantity(1.9, (1, 0, 0)),
     ("Distance", "damping"): Quantity(0.5, (0, 1, -1)),
 }
@@ -149,8 +155,8 @@ KIN = {
     "ElasticSolid": "Springs",
     "HarmonicBonds": "Springs", "FENEBonds": "Bonds", "HarmonicAngles": "Angles",
     "Mie": "LennardJones", "Yukawa": "PairPotential", "Morse": "PairPotential",
-    "DFSPH": "SPH",
     "CapsuleBoundary": "Boundary", "CylinderBoundary": "Boundary", "MeshBoundary": "Boundary",
+    "DFSPH": "SPH", "Bending": "Constraint", "IsometricBending": "Constraint",
     "SoftSphere": "PairPotential", "Coulomb": "PairPotential", "Electrostatics": "PairPotential",
 }  # fmt: skip
 # To a grid, which rests in the frame that it is made in, and to groups of several fluids.

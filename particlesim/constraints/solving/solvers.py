@@ -8,10 +8,10 @@ import numpy as np
 import warp as wp
 
 from ...engine.execution.launch import launch
-from ...kernels.constraints import jacobi
 from ...kernels.constraints.constraints import Solved, positions_type
 from ...kernels.constraints.projection import BLOCK, project_kernel
-from ...kernels.constraints.unmet import unmet_kernel
+from ...kernels.constraints.solving import jacobi
+from ...kernels.constraints.solving.unmet import unmet_kernel
 from ...kernels.engine.sweeps import multipliers_kernel
 
 

@@ -10,7 +10,11 @@ from ...engine.execution.copies import zero
 from ...engine.execution.launch import launch
 from ...engine.integrators import method
 from ...kernels.constraints.constraints import Solved
-from ...kernels.constraints.tuple_velocities import bounce_kernel, damp_kernel, straighten_kernel
+from ...kernels.constraints.solving.tuple_velocities import (
+    bounce_kernel,
+    damp_kernel,
+    straighten_kernel,
+)
 
 
 class TupleVelocities:

@@ -8,9 +8,9 @@ import functools
 
 import warp as wp
 
-from ..engine.bounces import bounces_type
-from ..precision import function, register
-from .constraints import Solved, positions_type, view_function
+from ...engine.bounces import bounces_type
+from ...precision import function, register
+from ..constraints import Solved, positions_type, view_function
 
 
 def _look_function(law: Solved) -> wp.Function:

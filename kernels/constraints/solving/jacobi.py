@@ -4,10 +4,10 @@ import functools
 
 import warp as wp
 
-from ..precision import register
-from .constraint_force import Seats
-from .constraints import Solved, place_function, positions_type, rounding_function
-from .correction import evaluate_function, load_function, multiply_function
+from ...precision import register
+from ..constraint_force import Seats
+from ..constraints import Solved, place_function, positions_type, rounding_function
+from ..correction import evaluate_function, load_function, multiply_function
 
 
 @functools.cache

@@ -4,8 +4,8 @@ import functools
 
 import warp as wp
 
-from ..precision import function, register
-from .constraints import Solved, positions_type, view_function
+from ...precision import function, register
+from ..constraints import Solved, positions_type, view_function
 
 
 def off_function(law: Solved) -> wp.Function:

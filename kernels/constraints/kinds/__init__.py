@@ -1,0 +1,1 @@
+"""Evaluations of constraints on tuples that are written by hand."""

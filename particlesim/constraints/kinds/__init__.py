@@ -1,0 +1,1 @@
+"""Laws on tuples of particles, one file a kind."""
