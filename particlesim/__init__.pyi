@@ -24,9 +24,11 @@ from .constraints.contact import Contact
 from .constraints.distance import Distance
 from .constraints.force import ConstraintForce
 from .constraints.gradient import check_gradient
+from .constraints.kinds.angle import Angle
+from .constraints.kinds.area import Area
 from .constraints.kinds.bending import Bending, hinges
 from .constraints.kinds.isometric_bending import IsometricBending
-from .constraints.scene import Scene
+from .constraints.kinds.volume import Volume
 from .engine.execution.launch import launch
 from .engine.integrators.integrator import Integrator
 from .instruments.correlations import (
@@ -106,7 +108,9 @@ __all__ = [
     "SPH",
     "XSPH",
     "AdaptiveSmoothing",
+    "Angle",
     "Angles",
+    "Area",
     "ArtificialViscosity",
     "BallJoint",
     "Barostat",
@@ -203,6 +207,7 @@ __all__ = [
     "UsdRecorder",
     "VelocityRescaling",
     "Viscosity",
+    "Volume",
     "WendlandC2",
     "WendlandC4",
     "WendlandC6",

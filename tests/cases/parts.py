@@ -22,6 +22,7 @@ TUPLES = {
     "pairs": PAIRS, "particles": PAIRS, "triples": [(0, 1, 3), (1, 3, 7), (4, 5, 7), (2, 6, 4)],
     "quadruples": [(0, 1, 3, 7), (5, 4, 6, 2), (0, 2, 6, 7)],
     "clusters": [(0, 1, 3, 7, 2), (5, 4, 6, 2, 0)], "a": [(0, 1, 3, 7)], "b": [(5, 4, 6, 2)],
+    "triangles": [(0, 1, 3), (4, 6, 7)], "tetrahedra": [(0, 1, 3, 7), (5, 2, 4, 0)],
     "hinges": [(0, 1, 3, 7), (5, 4, 6, 2), (0, 2, 6, 7)],
 }  # fmt: skip
 
@@ -126,6 +127,14 @@ QUANTITIES = {
     ("Bending", "rest_angle"): Quantity(0.7, kind="signed"),
     ("Bending", "compliance"): Quantity(0.3, (-2, -1, 2)),
     ("Bending", "damping"): Quantity(0.2, (2, 1, -1)),
+    "rest_area": Quantity(0.9, (2, 0, 0)),
+    "rest_volume": Quantity(0.4, (3, 0, 0), "signed"),
+    ("Angle", "compliance"): Quantity(0.3, (-2, -1, 2)),
+    ("Angle", "damping"): Quantity(0.2, (2, 1, -1)),
+    ("Area", "compliance"): Quantity(0.3, (2, -1, 2)),
+    ("Area", "damping"): Quantity(0.2, (-2, 1, -1)),
+    ("Volume", "compliance"): Quantity(0.3, (4, -1, 2)),
+    ("Volume", "damping"): Quantity(0.2, (-4, 1, -1)),
     ("IsometricBending", "compliance"): Quantity(0.3, (-2, -1, 2)),
     ("IsometricBending", "damping"): Quantity(0.2, (2, 1, -1)),
     ("SphereBoundary", "radius"): Quantity(1.9, (1, 0, 0)),
@@ -156,7 +165,8 @@ KIN = {
     "HarmonicBonds": "Springs", "FENEBonds": "Bonds", "HarmonicAngles": "Angles",
     "Mie": "LennardJones", "Yukawa": "PairPotential", "Morse": "PairPotential",
     "CapsuleBoundary": "Boundary", "CylinderBoundary": "Boundary", "MeshBoundary": "Boundary",
-    "DFSPH": "SPH", "Bending": "Constraint", "IsometricBending": "Constraint",
+    "DFSPH": "SPH", "Angle": "Constraint", "Area": "Constraint", "Volume": "Constraint",
+    "Bending": "Constraint", "IsometricBending": "Constraint",
     "SoftSphere": "PairPotential", "Coulomb": "PairPotential", "Electrostatics": "PairPotential",
 }  # fmt: skip
 # To a grid, which rests in the frame that it is made in, and to groups of several fluids.

@@ -37,6 +37,10 @@ TETRAHEDRON = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
 # Arguments that each part can be made with.
 PARTS = {
     ps.AdaptiveSmoothing: {"eta": 1.2, "largest": 1.0},
+    ps.Angle: {"triples": [(0, 1, 2)], "rest_angle": 1.0, "compliance": 0.1, "damping": 0.1,
+               "break_force": 10.0},
+    ps.Area: {"triangles": [(0, 1, 2)], "rest_area": 1.0, "compliance": 0.1, "damping": 0.1,
+              "break_force": 10.0},
     ps.Angles: {"triples": [(0, 1, 2)], "law": wave, "level": 1.0},
     ps.ArtificialViscosity: {"alpha": 0.1, "beta": 0.2},
     ps.BallJoint: {"a": [0, 1, 2], "b": [3, 4, 5], "point": (0, 0, 0), "compliance": 0.1,
@@ -117,6 +121,8 @@ PARTS = {
     ps.SurfaceTension: {"fluid": FLUIDS, "coefficient": 1.0},
     ps.Tait: {"sound_speed": 10.0, "exponent": 7.0},
     ps.UniformGravity: {"acceleration": (0, -9.81, 0)},
+    ps.Volume: {"tetrahedra": [(0, 1, 2, 3)], "rest_volume": 1.0, "compliance": 0.1,
+                "damping": 0.1, "break_force": 10.0},
     ps.XSPH: {"epsilon": 0.5},
     ps.Yukawa: {"strength": 1.0, "screening": 1.0, "cutoff": 2.5},
 }  # fmt: skip
@@ -139,8 +145,9 @@ INDICES = {
 }  # fmt: skip
 SIGNED = {
     "G", "acceleration", "angular_velocity", "axis", "drawn", "end", "flow", "force", "heights",
-    "level", "lower", "normal", "periodic", "pivot", "places", "point", "pressure", "rest_angle",
-    "rest_volume", "start", "strength", "times", "turns", "upper", "velocity", "vertices",
+    "level", "lower", "normal", "periodic", "pivot", "places", "point", "pressure",
+    (ps.Bending, "rest_angle"), (ps.Volume, "rest_volume"), "start", "strength", "times",
+    "turns", "upper", "velocity", "vertices",
 }  # fmt: skip
 
 
