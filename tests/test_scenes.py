@@ -154,6 +154,7 @@ def test_a_crystal_melts_and_freezes(device):
     assert energy[frozen].mean() < line - 0.2
 
 
+@pytest.mark.slow
 def test_a_cluster_in_equilibrium_stays_as_it_is(device):
     module, sim = simulate("plummer_sphere", 0, device, count=10_000)
     before = sim.diagnostics()

@@ -117,6 +117,7 @@ def check(name, apart=1.5):
 @pytest.mark.parametrize(
     "name", [pytest.param("triple_pendulum", marks=pytest.mark.slow), "three_body"]
 )
+@pytest.mark.slow
 def test_tunes_a_ready_scene(name):
     error, cost = check(name, 4.0)
     assert error <= 1.0

@@ -102,7 +102,10 @@ CASES = {
 }
 
 
-ALIKE = {"groups", "the first wider than the second", "two cutoffs, large worlds"}
+ALIKE = {
+    "groups", "the first wider than the second", "two cutoffs, large worlds",
+    "two cutoffs, small worlds", "fluid and a force",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])

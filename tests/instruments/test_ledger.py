@@ -136,7 +136,9 @@ def test_a_bounce_takes_its_share(restitution, device):
 # Balances -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", swept())
+@pytest.mark.parametrize(
+    "name", [pytest.param(k, marks=[pytest.mark.slow] * (k == "sod_tube")) for k in swept()]
+)
 def test_every_ready_scene_closes(name, device):
     module, scene = small(name)
     settings = module.settings.replace(ledger=True, substeps=min(module.settings.substeps, 100))

@@ -179,7 +179,7 @@ def test_the_same_bits_on_graph_and_threads_and_in_a_batch():
 
 
 @pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.parametrize("periodic", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_plain_loops_give_the_same(periodic, precision, monkeypatch):
     results = []
     for vectorised in (True, False):

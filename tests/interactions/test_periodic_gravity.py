@@ -30,7 +30,9 @@ def simulate(scenes, device="cpu", **knobs):
     return ps.Simulation(scenes, ps.Settings(**{"precision": "float64", **knobs}), device=device)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    "method", [pytest.param(name, marks=[pytest.mark.slow] * (name == "ewald")) for name in METHODS]
+)
 def test_it_is_that_of_all_images(method, device):
     """Ewald's sum to rounding, less what the background has with the masses, pi M^2 / (2 a^2 V) at
     its damping; to ten times the tolerance, as for charges. Without softening U is its own virial.

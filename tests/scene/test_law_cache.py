@@ -6,6 +6,8 @@ import sys
 
 PROGRAM = """
 import sys
+
+import pytest
 import warp as wp
 import particlesim as ps
 
@@ -46,6 +48,7 @@ ps.Simulation(scene, device="cpu").step()
 """
 
 
+@pytest.mark.slow
 def test_kernels_are_found_in_the_cache_again(tmp_path):
     # The second process makes the same functions in the opposite order.
     program = tmp_path / "program.py"

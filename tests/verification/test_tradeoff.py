@@ -141,6 +141,7 @@ def tail(cutoff):
     return 8 / 3 * np.pi * DENSITY * (cutoff**-9 / 3 - cutoff**-3)
 
 
+@pytest.mark.slow
 def test_lennard_jones_cutoff_leaves_out_its_tail(device):
     settings = ps.Settings(dt=1e-9, substeps=1, precision="float64")
     energy = lambda sim: sim.diagnostics().potential[0] / ATOMS  # noqa: E731

@@ -30,6 +30,7 @@ def summed(x, held, count=8):
         pytest.param(False, "velocity_verlet", marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.slow
 def test_adds_up_to_what_a_sum_changes_by(held, integrator):
     """d/dt sum_j m_j W_ij = sum_j m_j v_ij . grad_i W_ij, also of images, to second order."""
     errors = []

@@ -46,6 +46,7 @@ def go_on_alike(scenes, path, device, **knobs):
     assert np.array_equal(one.get("density"), scenes[0].column("start_density"))
 
 
+@pytest.mark.slow
 def test_bits(cloud, tmp_path, device):
     scenes = [
         loose(*cloud(count, seed=count), np.linspace(0.9, 1.1, count)) for count in (200, 90)

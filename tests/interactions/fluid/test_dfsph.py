@@ -53,6 +53,7 @@ def by_slot(fluid, values):
 
 
 @pytest.mark.parametrize("kind", WALLS)
+@pytest.mark.slow
 def test_rates_are_those_of_densities(kind):
     """The rate of density by velocities against densities a little later and a little earlier."""
     sim = simulation(water(kind))
