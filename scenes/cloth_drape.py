@@ -15,6 +15,7 @@ def build(
     cells: int = 56,
     areal_density: float = 0.15,
     stiffness: float = 1e3,
+    bending: float = 1e-4,
     friction: float = 0.4,
 ) -> ps.Scene:
     """A square cloth, level above a ball that stands on the floor.
@@ -24,6 +25,7 @@ def build(
         cells: Along each side.
         areal_density: [kg/m^2].
         stiffness: Young's modulus times the thickness [N/m].
+        bending: Bending stiffness, as of a woollen cloth [J].
         friction: Of the cloth on the ball and the floor.
     """
     scene = ps.Scene()
@@ -33,7 +35,8 @@ def build(
     second = side * np.array([np.cos(turn), 0.0, -np.sin(turn)])
     scene.add_cloth(
         *ps.sample.rectangle(corner, (first, second), cells), areal_density=areal_density,
-        stiffness=stiffness, radius=0.005, group="cloth", color=(0.7, 0.2, 0.15),
+        stiffness=stiffness, bending_stiffness=bending, radius=0.005, group="cloth",
+        color=(0.7, 0.2, 0.15),
     )  # fmt: skip
     scene.add_interaction(ps.UniformGravity((0, -9.81, 0)))
     scene.add_interaction(ps.Drag(linear=0.5 * areal_density * (side / cells) ** 2))

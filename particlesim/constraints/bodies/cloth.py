@@ -12,6 +12,7 @@ from ...scene import sample
 from ...scene.constraint_base import ConstraintBase
 from ...scene.scene import Scene
 from ..distance import Distance
+from ..kinds.bending import Bending, hinges
 from .body import Body, add_body, compliance, held, massive, shares
 
 OWNER = "Scene.add_cloth"
@@ -19,8 +20,9 @@ OWNER = "Scene.add_cloth"
 
 def add_cloth(
     scene: Scene, vertices: Any, triangles: Any, *, areal_density: float, radius: Any = 0.0,
-    stiffness: float | None = None, break_force: Any = None, pinned: Any = (),
-    velocity: Any = 0.0, group: str | None = None, color: Sequence[float] | None = None,
+    stiffness: float | None = None, bending_stiffness: float = 0.0, break_force: Any = None,
+    pinned: Any = (), velocity: Any = 0.0, group: str | None = None,
+    color: Sequence[float] | None = None,
 ) -> Body:  # fmt: skip
     """Add a cloth or a membrane: the vertices of a mesh, at the lengths of its edges.
 
@@ -31,23 +33,23 @@ def add_cloth(
 
     Args:
         vertices: (n, 3) [length].
-        triangles: (t, 3) indices of vertices, all turning the same way round; with the vertices as
-            ``sample.rectangle``, ``sample.icosphere`` and ``sample.mesh`` give them. It is drawn as
-            these, less those of which an edge is torn.
+        triangles: (t, 3) indices of vertices, all turning the same way round, as of
+            ``sample.rectangle``; drawn are those of which no edge is torn.
         areal_density: [mass/area]; a triangle weighs on its corners alike.
         radius: Of the particles, one or (n,), by which contacts and boundaries hold them [length].
         stiffness: Y, Young's modulus times the thickness [force/length]. None: it does not stretch.
-        break_force: Force at which an edge is torn for good, one or one for each row of
-            ``sample.edges(triangles)`` [force]; None: unbreakable.
-        pinned: Numbers of vertices that are held, or (n,) bool.
+        bending_stiffness: D = E h^3 / (12 (1 - nu^2)) [energy], at rest as it is at the start (see
+            :class:`Bending`). 0: it bends freely.
+        break_force: Force at which an edge is torn for good [force], one or one for each row of
+            ``sample.edges(triangles)``; None: unbreakable.
+        pinned: Vertices that are held, by number or (n,) bool.
         velocity, group, color: As of ``add_particles``.
 
     Returns:
-        A :class:`Body` with the constraint ``"stretch"``.
+        A :class:`Body` with the constraints ``"stretch"`` and, where it resists, ``"bend"``.
 
     Raises:
-        ValueError: Triangles without area, or that three share an edge; a vertex in none; values
-            out of range, and what ``add_particles`` refuses.
+        ValueError: A triangle without area, a vertex in none, and what ``add_particles`` refuses.
 
     Example:
         >>> from particlesim import Scene, sample
@@ -60,19 +62,20 @@ def add_cloth(
     x = validate.rows(OWNER, "vertices", vertices, None, 3)
     faces = validate.triangles(OWNER, triangles, len(x))
     area = areas(OWNER, x, faces)
-    density = validate.number(OWNER, "areal_density", areal_density, above=0.0, unit="mass/area")
+    heavy = validate.number(OWNER, "areal_density", areal_density, above=0.0, unit="mass/area")
     share = shares(faces, area, len(x))
     massive(OWNER, "vertices", share)
     pairs, first = sample.edges(faces), scene.particle_count
-    softness = compliance(OWNER, "stiffness", stiffness, "force/length")
+    softness = _slenderness(x, pairs, faces, area)
+    softness *= compliance(OWNER, "stiffness", stiffness, "force/length")
     constraints: dict[str, ConstraintBase] = {
-        "stretch": Distance(
-            pairs + first, compliance=softness * _slenderness(x, pairs, faces, area),
-            break_force=break_force,
-        )
-    }  # fmt: skip
+        "stretch": Distance(pairs + first, compliance=softness, break_force=break_force)
+    }
+    d = validate.number(OWNER, "bending_stiffness", bending_stiffness, minimum=0.0, unit="energy")
+    if d > 0.0 and len(bends := hinges(faces)):
+        constraints["bend"] = Bending(bends + first, compliance=_breadth(x, bends) / d)
     return add_body(
-        scene, x, constraints, mass=density * share, radius=radius, triangles=faces,
+        scene, x, constraints, mass=heavy * share, radius=radius, triangles=faces,
         pinned=held(OWNER, pinned, len(x)), velocity=velocity, group=group, color=color,
     )  # fmt: skip
 
@@ -100,3 +103,10 @@ def _slenderness(
     at = np.searchsorted(pairs @ [len(x), 1], sides @ [len(x), 1])  # edges are in order
     beside = np.bincount(at, weights=np.repeat(area, 3), minlength=len(pairs))
     return ((x[pairs[:, 1]] - x[pairs[:, 0]]) ** 2).sum(axis=1) / beside
+
+
+def _breadth(x: np.ndarray, bends: np.ndarray) -> np.ndarray:
+    """The area of both triangles of a hinge over the square of its edge, (h,)."""
+    edge, near, far = (x[bends[:, k]] - x[bends[:, 0]] for k in (1, 2, 3))
+    area = sum(0.5 * np.linalg.norm(np.cross(edge, wing), axis=1) for wing in (near, far))
+    return area / (edge**2).sum(axis=1)

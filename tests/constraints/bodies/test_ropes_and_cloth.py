@@ -60,6 +60,24 @@ def test_a_cloth_weighs_its_triangles_and_stretches_by_its_stiffness():
     np.testing.assert_allclose(stretch.compliance, 1 / (50.0 * share))
 
 
+def test_a_cloth_bends_by_its_stiffness():
+    # Two right-angled halves of a square of 1/4, and two triangles that are larger.
+    vertices = np.array([(0, 0, 0), (0.5, 0, 0), (0, 0.5, 0), (0.5, 0.5, 0), (1.5, 0.5, 0)])
+    triangles = [(0, 1, 2), (2, 1, 3), (3, 1, 4)]
+    scene = ps.Scene()
+    scene.add_particles([(9, 9, 9)])
+    cloth = scene.add_cloth(vertices, triangles, areal_density=1.0, bending_stiffness=0.04)
+    assert list(cloth.constraints) == ["stretch", "bend"]
+    bend = cloth.constraints["bend"]
+    assert np.sort(bend.particles[:, :2], axis=1).tolist() == [[2, 3], [2, 4]]
+    # k = D l^2 / (A_1 + A_2), of areas 1/8, 1/8, 1/4.
+    np.testing.assert_allclose(bend.compliance, [0.25 / 0.5 / 0.04, 0.375 / 0.25 / 0.04])
+    lone = ps.Scene().add_cloth(
+        vertices[:3], triangles[:1], areal_density=1.0, bending_stiffness=0.04
+    )
+    assert list(lone.constraints) == ["stretch"]
+
+
 @pytest.mark.parametrize(
     ("options", "match"),
     [
@@ -90,6 +108,7 @@ def test_ropes_that_are_none_are_refused(refused, options, match):
         ({"triangles": [(0, 1, 9)]}, "triangles must hold indices from 0 to 8"),
         ({"areal_density": -1.0}, "areal_density must be above 0"),
         ({"stiffness": np.inf}, "stiffness must be finite"),
+        ({"bending_stiffness": -1.0}, "bending_stiffness must be at least 0"),
         ({"pinned": [True]}, "pinned must be numbers of points"),
         ({"radius": -1.0}, "radius"),
     ],
