@@ -18,6 +18,7 @@ from .constraints.kinds.angle import Angle
 from .constraints.kinds.area import Area
 from .constraints.kinds.bending import Bending, hinges
 from .constraints.kinds.isometric_bending import IsometricBending
+from .constraints.kinds.neo_hookean import NeoHookean
 from .constraints.kinds.volume import Volume
 from .engine.execution.launch import launch
 from .engine.integrators.integrator import Integrator
@@ -149,6 +150,7 @@ __all__ = [
     "Mie",
     "Morse",
     "MuellerViscosity",
+    "NeoHookean",
     "PairForce",
     "PairPotential",
     "PairSum",

@@ -86,6 +86,8 @@ PARTS = {
                    "density": 1.0, "damping": 0.1},
     ps.Mie: {"epsilon": 1.0, "sigma": 1.0, "cutoff": 2.5},
     ps.Morse: {"depth": 1.0, "steepness": 1.0, "distance": 1.0, "cutoff": 2.5},
+    ps.NeoHookean: {"tetrahedra": [(0, 1, 2, 3)], "youngs_modulus": 1.0, "poissons_ratio": 0.3,
+                    "damping": 0.1},
     ps.PairForce: {"law": pull, "cutoff": 1.0, "strength": 1.0},
     ps.PairPotential: {"law": pull, "cutoff": 1.0, "strength": 1.0},
     ps.ParticleShifting: {"speed": 1.0},
