@@ -16,6 +16,7 @@ from .constraints.force import ConstraintForce
 from .constraints.gradient import check_gradient
 from .constraints.kinds.angle import Angle
 from .constraints.kinds.area import Area
+from .constraints.kinds.attachment import Attachment
 from .constraints.kinds.bending import Bending, hinges
 from .constraints.kinds.isometric_bending import IsometricBending
 from .constraints.kinds.neo_hookean import NeoHookean
@@ -104,6 +105,7 @@ __all__ = [
     "Angles",
     "Area",
     "ArtificialViscosity",
+    "Attachment",
     "Barostat",
     "Bending",
     "Bonds",

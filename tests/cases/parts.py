@@ -153,8 +153,8 @@ KIN = {
     "Bending": "Constraint", "IsometricBending": "Constraint",
     "SoftSphere": "PairPotential", "Coulomb": "PairPotential", "Electrostatics": "PairPotential",
 }  # fmt: skip
-# To a grid, which rests in the frame that it is made in, and to groups of several fluids.
-BOUND = ("FieldForce", "SurfaceTension")
+# To points or a grid, which rest in the frame that they are made in, and to several fluids.
+BOUND = ("Attachment", "FieldForce", "SurfaceTension")
 
 
 NU = Quantity(0.1, (2, 0, -1))

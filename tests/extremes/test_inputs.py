@@ -42,6 +42,8 @@ PARTS = {
               "break_force": 10.0},
     ps.Angles: {"triples": [(0, 1, 2)], "law": wave, "level": 1.0},
     ps.ArtificialViscosity: {"alpha": 0.1, "beta": 0.2},
+    ps.Attachment: {"particles": [0], "target": (0, 1, 0), "compliance": 0.1, "damping": 0.1,
+                    "break_force": 10.0},
     ps.Bending: {"hinges": [(0, 1, 2, 3)], "rest_angle": 1.0, "compliance": 0.1, "damping": 0.1,
                  "break_force": 10.0},
     ps.Bonds: {"pairs": [(0, 1)], "law": pull, "strength": 1.0},
@@ -113,6 +115,7 @@ OPEN = {(ps.BoxBoundary, "lower"), (ps.BoxBoundary, "upper")}  # a side may be i
 NEVER = {
     (ps.Angle, "break_force"),
     (ps.Area, "break_force"),
+    (ps.Attachment, "break_force"),
     (ps.Bending, "break_force"),
     (ps.Constraint, "break_force"),
     (ps.Distance, "break_force"),
@@ -120,7 +123,7 @@ NEVER = {
     (ps.Volume, "break_force"),
 }  # may be infinite: unbreakable
 INDICES = {"hinges", "pairs", "triples", "quadruples", "particles", "triangles", "tetrahedra"}
-SIGNED = {"velocity", "angular_velocity", "pivot", "drawn",
+SIGNED = {"velocity", "target", "angular_velocity", "pivot", "drawn",
           "level", "strength", "flow", "force", "acceleration", "point", "normal", "lower", "upper",
           "periodic", "G", "pressure", (ps.Bending, "rest_angle"),
           (ps.Volume, "rest_volume")}  # fmt: skip
