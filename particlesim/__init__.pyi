@@ -9,7 +9,8 @@ from .accuracy.tune.report import Tuned
 from .accuracy.tune.tuning import tune
 from .constraints.boundary import Boundary
 from .constraints.boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
-from .constraints.clusters.joints import BallJoint, Hinge
+from .constraints.clusters.hinge import Hinge
+from .constraints.clusters.joints import BallJoint
 from .constraints.clusters.mesh_volume import MeshVolume
 from .constraints.clusters.shape_matching import ShapeMatching
 from .constraints.constraint import Constraint

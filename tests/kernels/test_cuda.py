@@ -63,7 +63,7 @@ def simulate(name, precision):
     for constraint in sim.constraints:
         with launch.record(launch.Program()):
             constraint.reset([0])
-            if isinstance(constraint, ps.ShapeMatching):
+            if isinstance(constraint, ps.ShapeMatching | ps.BallJoint):
                 state = SimpleNamespace(bounce_velocity=sim.state.velocity)
                 constraint.bounce(state, sim.neighbors, 0.01)
     return sim
