@@ -17,7 +17,8 @@ from .constraints.boundaries.round import CapsuleBoundary, CylinderBoundary
 from .constraints.boundaries.sampled import SDFBoundary
 from .constraints.boundary import Boundary
 from .constraints.boundary_shapes import BoxBoundary, PlaneBoundary, SphereBoundary
-from .constraints.clusters.joints import BallJoint, Hinge
+from .constraints.clusters.hinge import Hinge
+from .constraints.clusters.joints import BallJoint
 from .constraints.clusters.mesh_volume import MeshVolume
 from .constraints.clusters.shape_matching import ShapeMatching
 from .constraints.constraint import Constraint

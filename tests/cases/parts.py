@@ -172,13 +172,14 @@ KIN = {
     "HarmonicBonds": "Springs", "FENEBonds": "Bonds", "HarmonicAngles": "Angles",
     "Mie": "LennardJones", "Yukawa": "PairPotential", "Morse": "PairPotential",
     "CapsuleBoundary": "Boundary", "CylinderBoundary": "Boundary", "MeshBoundary": "Boundary",
-    "DFSPH": "SPH", "NeoHookean": "Constraint", "Angle": "Constraint", "Area": "Constraint", "Volume": "Constraint",
+    "DFSPH": "SPH", "NeoHookean": "Constraint", "Angle": "Constraint", "Area": "Constraint",
+    "Volume": "Constraint",
     "Bending": "Constraint", "IsometricBending": "Constraint",
     "SoftSphere": "PairPotential", "Coulomb": "PairPotential", "Electrostatics": "PairPotential",
 }  # fmt: skip
 # To a grid, which rests in the frame that it is made in, and to groups of several fluids.
-BOUND = ("Attachment", "FieldForce", "SurfaceTension", "HeightfieldBoundary", "SDFBoundary", "UnionBoundary",
-         "ComplementBoundary")  # fmt: skip
+BOUND = ("Attachment", "FieldForce", "SurfaceTension", "HeightfieldBoundary", "SDFBoundary",
+         "UnionBoundary", "ComplementBoundary")  # fmt: skip
 
 
 NU = Quantity(0.1, (2, 0, -1))

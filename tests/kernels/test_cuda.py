@@ -6,7 +6,6 @@ compiled to PTX, of all ready scenes and of others beside. What none of them lau
 
 import ast
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +16,7 @@ from cases.every_kernel import EVERY_KERNEL, SCENES
 from particlesim import kernels
 from particlesim.engine.execution import launch
 from particlesim.engine.model import Model
+from particlesim.kernels.engine.bounces import bounces_type
 from particlesim.kernels.precision import KERNELS
 from particlesim.output.history.sample import sample
 from particlesim.pictures.render import renderer  # noqa: F401 - its kernels are to be compiled too
@@ -63,9 +63,11 @@ def simulate(name, precision):
     for constraint in sim.constraints:
         with launch.record(launch.Program()):
             constraint.reset([0])
-            if isinstance(constraint, ps.ShapeMatching):
-                state = SimpleNamespace(bounce_velocity=sim.state.velocity)
-                constraint.bounce(state, sim.neighbors, 0.01)
+    bounces = bounces_type(sim.model.precision)()
+    with launch.record(launch.Program()):
+        for constraint in sim.constraints:
+            constraint.start_bounce(sim.state, sim.neighbors, bounces, 0.01)
+            constraint.bounce(sim.state, sim.neighbors, bounces, 0.01)
     return sim
 
 

@@ -85,6 +85,22 @@ def _turning(a: Side, b: Side, r_a: wp.vec3d, r_b: wp.vec3d):
 turning = function(_turning)
 
 
+def _crosswise(K: wp.mat33d, u: wp.vec3d, off: wp.vec3d):
+    """The torque across u that makes up for ``off`` there; about u it is free."""
+    one = wp.identity(n=3, dtype=double)
+    across = one - wp.outer(u, u)
+    size = wp.trace(K)
+    torque = wp.vec3d()
+    if size > double(0.0):
+        thin = double(wp.static(THIN)) * size * one  # a line is not to be turned about itself
+        free = across * K * across + size * wp.outer(u, u) + thin
+        torque = wp.inverse(free) * (across * off)
+    return torque
+
+
+crosswise = function(_crosswise)
+
+
 def _within(
     axis: wp.vec3d, arm: wp.vec3d, stop: wp.vec2d, turned: wp.vec3d, K: wp.mat33d, a: Side,
     b: Side,
@@ -100,19 +116,14 @@ def _within(
     u = wp.normalize(a.R_0 * axis + b.R_0 * axis)
     angle = wp.atan2(wp.dot(now, wp.cross(v_a, v_b)), wp.dot(v_a, v_b))
     excess = angle - wp.clamp(angle, stop[0], stop[1])
-    one = wp.identity(n=3, dtype=double)
-    across = one - wp.outer(u, u)
-    off = across * (wp.cross(u_a, u_b) - turned)
-    size = wp.trace(K)
-    torque = wp.vec3d()
-    if size > double(0.0):
-        thin = double(wp.static(THIN)) * size * one  # a line is not to be turned about itself
-        free = across * K * across + size * wp.outer(u, u) + thin
-        torque = wp.inverse(free) * off
-        if excess != double(0.0):
-            stopped = wp.inverse(K + thin) * (off + u * (excess - wp.dot(u, turned)))
-            if wp.dot(stopped, u) * excess > double(0.0):  # a stop only pushes
-                torque = stopped
+    off = wp.cross(u_a, u_b) - turned
+    torque = crosswise(K, u, off)
+    if excess != double(0.0):
+        one = wp.identity(n=3, dtype=double)
+        off = (one - wp.outer(u, u)) * off + u * (excess - wp.dot(u, turned))
+        stopped = wp.inverse(K + double(wp.static(THIN)) * wp.trace(K) * one) * off
+        if wp.dot(stopped, u) * excess > double(0.0):  # a stop only pushes
+            torque = stopped
     return torque
 
 
@@ -148,3 +159,22 @@ def _hinged(
 
 
 hinged = function(_hinged)
+
+
+def _struck(
+    a: Side, b: Side, r_a: wp.vec3d, r_b: wp.vec3d, at_a: wp.vec3d, at_b: wp.vec3d,
+    parting: wp.vec3d, spin: wp.vec3d, u: wp.vec3d,
+):  # fmt: skip
+    """The blow that takes back how fast points part and, across u, how fast sides turn apart."""
+    K, turn = pushing(a, b, r_a, r_b, at_a, at_b)
+    way, spread = turning(a, b, r_a, r_b)
+    inverse = wp.inverse(K)
+    blow = Blow()
+    blow.push = -(inverse * parting)
+    held = spread - turn * inverse * way
+    blow.torque = crosswise(held, u, -(spin + turn * blow.push))
+    blow.push = blow.push - inverse * (way * blow.torque)
+    return blow
+
+
+struck = function(_struck)

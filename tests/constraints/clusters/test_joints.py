@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 import particlesim as ps
 from cases.worlds import equal_alone, goes_on_after_reset_and_save
+from particlesim.kernels.engine.bounces import bounces_type
+from particlesim.kernels.precision import FLOAT64
 
 G = 9.81
 EPS = float(np.finfo(np.float64).eps)
@@ -116,6 +119,40 @@ def test_a_hinge_stops_at_its_limit_and_tells_its_force(simulate):
     assert np.abs(sim.velocity).max() < 1e-6
     # The stop is a torque alone: the point bears all the weight.
     assert sim.force(hinge) == pytest.approx(COUNT * G, rel=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["hinge", "ball"])
+def test_a_change_of_velocities_goes_through_a_joint(kind, simulate):
+    """One side is struck: the points keep together, and the axes; momentum and spin are kept."""
+    scene = pair(pivoted(kind), [(0, 0, 0), (0, 0, 0)])
+    sim, x, n = simulate(scene), scene.position, 2 * COUNT
+    joint, before = sim.constraints[0], np.zeros((n, 3))
+    push = np.zeros((n, 3))
+    push[:COUNT] = np.cross((3, -1, 2), x[:COUNT] - x[:COUNT].mean(axis=0))
+    push[:COUNT] += (1, 2, 3)
+    sim.state.velocity.assign(push)
+    bounces = bounces_type(FLOAT64)()
+    bounces.before = wp.array(before, dtype=wp.vec3d, device="cpu")
+    bounces.running = wp.ones(1, dtype=wp.int32, device="cpu")
+    joint.bounce(sim.state, sim.neighbors, bounces, 0.01)
+    u = sim.velocity
+    # Sums of some tens of terms of size 3.
+    assert np.abs((u - push).sum(axis=0)).max() < n * 3 * EPS
+    assert np.abs(np.cross(x, u - push).sum(axis=0)).max() < n * 9 * EPS
+    motions = []
+    for rows in (slice(COUNT), slice(COUNT, None)):
+        r = x[rows] - x[rows].mean(axis=0)
+        inertia = (r**2).sum() * np.eye(3) - r.T @ r
+        spin = np.linalg.solve(inertia, np.cross(r, u[rows]).sum(axis=0))
+        at = np.array([0.45, 0.1, 0.1]) - x[rows].mean(axis=0)
+        motions.append((u[rows].mean(axis=0) + np.cross(spin, at), spin))
+    assert np.abs(motions[0][0] - motions[1][0]).max() < 1e3 * EPS
+    apart = motions[0][1] - motions[1][1]
+    assert np.linalg.norm(apart) > 0.1
+    if kind == "hinge":
+        # What keeps the answer of a line finite adds 1e-12 of the mean one, over the least one.
+        assert np.abs(np.cross(apart, (0, 1, 1))).max() < 1e-10
 
 
 @pytest.mark.slow

@@ -183,6 +183,7 @@ def test_a_soft_cluster_hangs_as_deep_whatever_the_iterations(simulate, scene_of
         assert sim.force(body) == pytest.approx(2 * G, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_velocities_become_rigid(simulate, scene_of):
     """What members of a body are pushed by goes to all of it, momentum and spin unchanged."""
     rng = np.random.default_rng(1)
