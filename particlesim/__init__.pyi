@@ -27,8 +27,10 @@ from .constraints.force import ConstraintForce
 from .constraints.gradient import check_gradient
 from .constraints.kinds.angle import Angle
 from .constraints.kinds.area import Area
+from .constraints.kinds.attachment import Attachment
 from .constraints.kinds.bending import Bending, hinges
 from .constraints.kinds.isometric_bending import IsometricBending
+from .constraints.kinds.neo_hookean import NeoHookean
 from .constraints.kinds.volume import Volume
 from .engine.execution.launch import launch
 from .engine.integrators.integrator import Integrator
@@ -113,6 +115,7 @@ __all__ = [
     "Angles",
     "Area",
     "ArtificialViscosity",
+    "Attachment",
     "BallJoint",
     "Barostat",
     "Bending",
@@ -169,6 +172,7 @@ __all__ = [
     "Mie",
     "Morse",
     "MuellerViscosity",
+    "NeoHookean",
     "PairForce",
     "PairPotential",
     "PairSum",

@@ -20,7 +20,7 @@ from .constraint import Constraint
 STEP = float(np.finfo(np.float64).eps ** (1 / 3))
 
 
-def check_gradient(constraint: Any, points: Any, **parameters: Any) -> float:
+def check_gradient(constraint: Any, points: Any, *, start: Any = None, **parameters: Any) -> float:
     """How far the gradient of a constraint is from central differences of it, in float64.
 
     Where the law is smooth on the scale of its tuples this is 1e-9 or less: differences themselves
@@ -32,6 +32,8 @@ def check_gradient(constraint: Any, points: Any, **parameters: Any) -> float:
             :class:`Constraint` takes it.
         points: Positions [length]: (n, 3) of the particles that the constraint names; of a law
             (k, 3), or (m, k, 3) to try it at m places.
+        start: Positions at the start, (n, 3) [length], of which a constraint takes what it keeps;
+            None: the points.
         **parameters: Of the law, by keyword.
 
     Returns:
@@ -57,9 +59,6 @@ def check_gradient(constraint: Any, points: Any, **parameters: Any) -> float:
             "check_gradient", "points", f"hold {part.particles.max() + 1} points or more",
             len(places), "give the positions of all particles that the constraint names",
         )  # fmt: skip
-    scene = Scene()
-    scene.add_particles(places)
-    model = Model([scene], Settings(precision="float64"), "cpu")
     x = places[part.particles]
     m, k, _ = x.shape
     if m == 0:
@@ -68,7 +67,9 @@ def check_gradient(constraint: Any, points: Any, **parameters: Any) -> float:
     step = STEP * np.where(size > 0, size, np.maximum(np.abs(x).max(axis=(1, 2)), 1.0))
     moves = np.concatenate([np.eye(3 * k), -np.eye(3 * k)]).reshape(1, 6 * k, k, 3)
     moved = x[:, None] + moves * step[:, None, None, None]
-    C, G = _evaluated(part, model, np.concatenate([x[:, None], moved], axis=1))
+    C, G = _evaluated(
+        part, places if start is None else start, np.concatenate([x[:, None], moved], axis=1)
+    )
     up, down = C[:, 1 : 3 * k + 1], C[:, 3 * k + 1 :]
     with np.errstate(invalid="ignore"):
         difference = (up - down) / (2.0 * step[:, None])
@@ -96,9 +97,12 @@ def _described(
     return Constraint(given, tuples, **parameters), places
 
 
-def _evaluated(part: Constraint, model: Model, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _evaluated(part: Constraint, start: Any, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """C (m, n) and gradients (m, n, k, 3) at n places of each of m tuples."""
     m, n, k, _ = places.shape
+    scene = Scene()
+    scene.add_particles(validate.rows("check_gradient", "start", start, None, 3))
+    model = Model([scene], Settings(precision="float64"), "cpu")
     Item, items = model.parameters("ConstraintItem", part.columns(model, 0))
     evaluate = part.evaluation(model, Item)
     Positions = positions_type(model.precision, k)

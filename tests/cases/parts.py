@@ -139,6 +139,7 @@ QUANTITIES = {
     ("Area", "damping"): Quantity(0.2, (-2, 1, -1)),
     ("Volume", "compliance"): Quantity(0.3, (4, -1, 2)),
     ("Volume", "damping"): Quantity(0.2, (-4, 1, -1)),
+    ("NeoHookean", "damping"): Quantity(0.02, (0, 0, 1)),
     ("IsometricBending", "compliance"): Quantity(0.3, (-2, -1, 2)),
     ("IsometricBending", "damping"): Quantity(0.2, (2, 1, -1)),
     ("SphereBoundary", "radius"): Quantity(1.9, (1, 0, 0)),
@@ -171,12 +172,12 @@ KIN = {
     "HarmonicBonds": "Springs", "FENEBonds": "Bonds", "HarmonicAngles": "Angles",
     "Mie": "LennardJones", "Yukawa": "PairPotential", "Morse": "PairPotential",
     "CapsuleBoundary": "Boundary", "CylinderBoundary": "Boundary", "MeshBoundary": "Boundary",
-    "DFSPH": "SPH", "Angle": "Constraint", "Area": "Constraint", "Volume": "Constraint",
+    "DFSPH": "SPH", "NeoHookean": "Constraint", "Angle": "Constraint", "Area": "Constraint", "Volume": "Constraint",
     "Bending": "Constraint", "IsometricBending": "Constraint",
     "SoftSphere": "PairPotential", "Coulomb": "PairPotential", "Electrostatics": "PairPotential",
 }  # fmt: skip
 # To a grid, which rests in the frame that it is made in, and to groups of several fluids.
-BOUND = ("FieldForce", "SurfaceTension", "HeightfieldBoundary", "SDFBoundary", "UnionBoundary",
+BOUND = ("Attachment", "FieldForce", "SurfaceTension", "HeightfieldBoundary", "SDFBoundary", "UnionBoundary",
          "ComplementBoundary")  # fmt: skip
 
 

@@ -45,6 +45,8 @@ PARTS = {
     ps.ArtificialViscosity: {"alpha": 0.1, "beta": 0.2},
     ps.BallJoint: {"a": [0, 1, 2], "b": [3, 4, 5], "point": (0, 0, 0), "compliance": 0.1,
                    "break_force": 1.0},
+    ps.Attachment: {"particles": [0], "target": (0, 1, 0), "compliance": 0.1, "damping": 0.1,
+                    "break_force": 10.0},
     ps.Bending: {"hinges": [(0, 1, 2, 3)], "rest_angle": 1.0, "compliance": 0.1, "damping": 0.1,
                  "break_force": 10.0},
     ps.Bonds: {"pairs": [(0, 1)], "law": pull, "strength": 1.0},
@@ -104,6 +106,8 @@ PARTS = {
                     "rest_volume": 1.0, "compliance": 0.1, "burst_pressure": 1.0},
     ps.Mie: {"epsilon": 1.0, "sigma": 1.0, "cutoff": 2.5},
     ps.Morse: {"depth": 1.0, "steepness": 1.0, "distance": 1.0, "cutoff": 2.5},
+    ps.NeoHookean: {"tetrahedra": [(0, 1, 2, 3)], "youngs_modulus": 1.0, "poissons_ratio": 0.3,
+                    "damping": 0.1},
     ps.PairForce: {"law": pull, "cutoff": 1.0, "strength": 1.0},
     ps.PairPotential: {"law": pull, "cutoff": 1.0, "strength": 1.0},
     ps.ParticleShifting: {"speed": 1.0},
@@ -133,6 +137,7 @@ NEVER = {
     (ps.Angle, "break_force"),
     (ps.Area, "break_force"),
     (ps.BallJoint, "break_force"),
+    (ps.Attachment, "break_force"),
     (ps.Bending, "break_force"),
     (ps.Constraint, "break_force"),
     (ps.Distance, "break_force"),
@@ -149,7 +154,7 @@ INDICES = {
 SIGNED = {
     "G", "acceleration", "angular_velocity", "axis", "drawn", "end", "flow", "force", "heights",
     "level", "lower", "normal", "periodic", "pivot", "places", "point", "pressure",
-    (ps.Bending, "rest_angle"), (ps.Volume, "rest_volume"), "start", "strength", "times",
+    (ps.Bending, "rest_angle"), (ps.Volume, "rest_volume"), "start", "strength", "target", "times",
     "turns", "upper", "velocity", "vertices",
 }  # fmt: skip
 
