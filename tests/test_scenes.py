@@ -23,7 +23,7 @@ def simulate(name, frames, device, settings=None, **options):
 
 def test_the_ready_scenes_are_all_there():
     expected = (
-        "bouncing_block cantilever catenary chain cloth_drape dam_break elastic_rings "
+        "balloon bouncing_block cantilever catenary chain cloth_drape dam_break elastic_rings "
         "elliptical_drop floating_block freezing galaxy_collision gas_in_a_box hydrostatic_tank "
         "lj_melt molten_salt phase_transition pile plummer_sphere poiseuille polymer_melt "
         "polytrope rain_on_cloth rigid_stack rising_bubble rope_bridge sedov_blast sloshing_tank "

@@ -13,6 +13,7 @@ from ...scene import scene
 from .cloth import add_cloth
 from .rigid import add_rigid_body
 from .rope import add_rope
+from .soft import add_soft_body
 
 
 class Scene(scene.Scene):
@@ -21,6 +22,7 @@ class Scene(scene.Scene):
     add_rope = add_rope
     add_cloth = add_cloth
     add_rigid_body = add_rigid_body
+    add_soft_body = add_soft_body
 
     def add_fluid(
         self,

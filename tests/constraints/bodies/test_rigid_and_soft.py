@@ -45,3 +45,43 @@ def test_rigid_bodies_that_are_none_are_refused(refused, options, match):
     with refused(match):
         scene.add_rigid_body(**{"points": BRICK, "spacing": 0.1, "density": 1.0} | options)
     assert scene.particle_count == 0 and not scene.constraints
+
+
+def test_a_soft_body_weighs_its_tetrahedra_and_is_drawn_as_its_surface():
+    mesh = ps.sample.box_tetrahedra((0, 0, 0), (0.4, 0.2, 0.2), spacing=0.1)
+    scene = ps.Scene()
+    scene.add_particles([(9, 9, 9)])
+    body = scene.add_soft_body(
+        *mesh, density=1000.0, youngs_modulus=2e4, poissons_ratio=0.4, radius=0.05, pinned=[0],
+        group="jelly",
+    )  # fmt: skip
+    assert scene.mass[1:].sum() == pytest.approx(1000.0 * 0.016)
+    assert np.average(scene.position[1:], axis=0, weights=scene.mass[1:]) == pytest.approx(
+        (0.2, 0.1, 0.1)
+    )
+    assert (body.group.triangles == ps.sample.surface(mesh[1])).all()
+    assert (scene.radius[1:] == 0.05).all() and np.flatnonzero(scene.pinned).tolist() == [1]
+    (elastic,) = scene.constraints
+    assert body.constraints == {"elastic": elastic}
+    assert (elastic.tetrahedra == mesh[1] + 1).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"tetrahedra": [(0, 1, 2)]}, r"tetrahedra must be whole numbers of shape \(t, 4\)"),
+        ({"tetrahedra": [(0, 1, 2, 99)]}, "tetrahedra must hold indices from 0 to"),
+        ({"tetrahedra": [(0, 1, 2, 3)]}, r"tetrahedra\[0\] must have a volume above 0"),
+        ({"density": 0.0}, "density must be above 0"),
+        ({"youngs_modulus": -1.0}, "youngs_modulus"),
+        ({"poissons_ratio": 0.6}, "poissons_ratio"),
+        ({"pinned": [99]}, "pinned must hold numbers from 0"),
+    ],
+)
+def test_soft_bodies_that_are_none_are_refused(refused, options, match):
+    vertices, tetrahedra = ps.sample.box_tetrahedra((0, 0, 0), (0.2, 0.1, 0.1), spacing=0.1)
+    given = {"vertices": vertices, "tetrahedra": tetrahedra, "density": 1.0, "youngs_modulus": 1.0}
+    scene = ps.Scene()
+    with refused(match):
+        scene.add_soft_body(**given | options)
+    assert scene.particle_count == 0 and not scene.constraints
