@@ -23,6 +23,9 @@ class NearestBoundary(SolidBoundary):
     A particle that touches several parts of the surface at once is brought back from one after the
     other, the nearest first, ``sides`` of them in each sweep.
 
+    A fluid sees the nearest point alone, so that in a corner it has images of one side. In those of
+    planes, of a box and of a cylinder's inside it has all.
+
     A member gives ``near``, what that takes, and its ``shapes``.
     """
 
