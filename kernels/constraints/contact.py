@@ -53,6 +53,15 @@ def touching_type(precision: Precision) -> Any:
     return structure(f"Touching_{precision.name}", fields)
 
 
+@function
+def excludes(partners: wp.array2d(dtype=wp.int32), i: int, j: int):
+    """Whether j is among the partners of i that it does not touch."""
+    for k in range(partners.shape[1]):
+        if partners[i, k] == j:
+            return True
+    return False
+
+
 @functools.cache
 def slack_kernels(precision: Precision, periodic: Periodicity) -> tuple[wp.Kernel, wp.Kernel]:
     """Kernels: the slack that leaves no pair overlapping, of marked worlds; and its running out.
@@ -70,6 +79,7 @@ def slack_kernels(precision: Precision, periodic: Periodicity) -> tuple[wp.Kerne
         pairs: Pairs,
         box: wp.array(dtype=Box),
         marked: wp.array(dtype=wp.int32),
+        apart_of: wp.array2d(dtype=wp.int32),
         b: Bodies,
         radius: wp.array(dtype=real),
         dt: real,
@@ -87,7 +97,8 @@ def slack_kernels(precision: Precision, periodic: Periodicity) -> tuple[wp.Kerne
             j = pairs.order[pairs.index[pairs.row[c] + wp.int64(k) * pairs.entry_stride]]
             reach = radius[i] + radius[j]
             r = wp.length(image(x_i - (b.x[j] - b.v[j] * dt), box[world]))
-            if j != i and r < factor * reach and b.w[i] + b.w[j] > real(0.0):
+            deeper = j != i and r < factor * reach and b.w[i] + b.w[j] > real(0.0)
+            if deeper and not excludes(apart_of, i, j):
                 factor = r / reach
         slack_out[i] = radius[i] * (real(1.0) - factor)
 

@@ -8,7 +8,7 @@ import warp as wp
 from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
 from ..precision import APART, Precision, function, register
 from .constraints import bodies_type
-from .contact import touching_type
+from .contact import excludes, touching_type
 
 MARGIN = 0.2  # parts of the lesser radius: as far as others push into contact what would not touch
 TOUCH = 1e-4  # and what still counts as touching, where contacts bounce
@@ -69,7 +69,7 @@ def find_kernel(precision: Precision, periodic: Periodicity, params: Any) -> wp.
     @register
     def find_contacts(
         first: int, pairs: Pairs, box: wp.array(dtype=Box), parameters: wp.array(dtype=params),
-        b: Bodies, dt: real, t_out: Touching,
+        apart_of: wp.array2d(dtype=wp.int32), b: Bodies, dt: real, t_out: Touching,
     ):  # fmt: skip
         s = first + wp.tid()
         i, w = pairs.order[s], pairs.world[s]
@@ -88,7 +88,8 @@ def find_kernel(precision: Precision, periodic: Periodicity, params: Any) -> wp.
             calm = calm_i + t_out.calm[j]
             rests = wp.dot(v, v) * dt * dt < calm * calm or not bounces
             touch = reach + wp.min(R_i, t_out.radius[j]) * wp.where(rests, near, exactly)
-            if j != i and meet(x_ij, u, touch) and b.w[i] + b.w[j] > real(0.0):
+            near_by = j != i and meet(x_ij, u, touch) and b.w[i] + b.w[j] > real(0.0)
+            if near_by and not excludes(apart_of, i, j):
                 if found < room:
                     at = begin + wp.int64(found)
                     d, d2 = apart(s, other, x_ij, wp.dot(x_ij, x_ij), p.closest_squared)

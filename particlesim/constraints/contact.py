@@ -10,6 +10,7 @@ import numpy as np
 import warp as wp
 
 from .. import validate
+from ..engine import topology
 from ..engine.easing import Easing
 from ..engine.execution.launch import call, launch, repeat, when
 from ..engine.limit import Limit
@@ -70,6 +71,10 @@ class Contact(EasedConstraint):
         restitution: e, 0 to 1: speed after over speed before.
         compliance: alpha, overlap over force [length / force], at least 0; alpha~ = alpha / dt^2.
 
+        exclude: Pairs that do not touch each other, (m, 2); or constraints and bonds that hold
+            them, one or several; True: whatever a constraint of the scene holds together, as for a
+            cloth that touches itself.
+
     Raises:
         ValueError: Values out of range.
 
@@ -82,7 +87,7 @@ class Contact(EasedConstraint):
 
     def __init__(
         self, group: Any = None, friction: float = 0.0, restitution: float = 0.0, *,
-        compliance: float = 0.0,
+        compliance: float = 0.0, exclude: Any = None,
     ):  # fmt: skip
         name = self.name
         self.group = group
@@ -93,6 +98,9 @@ class Contact(EasedConstraint):
         self.compliance = validate.number(
             name, "compliance", compliance, minimum=0.0, unit="length/force"
         )
+        self.exclude = exclude
+        if exclude is not True:
+            topology.excluded(name, exclude)  # which says what is wrong with it
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model, self.neighbors = model, neighbors
@@ -142,6 +150,10 @@ class Contact(EasedConstraint):
             **{name: self._column(name) for name in ("friction", "restitution", "compliance")},
         }
         Params, self.params = model.parameters("ContactParameters", columns)
+        excluded = topology.merged(
+            self.name, "exclude", model, [self._excluded(w) for w in range(model.world_count)]
+        )
+        self.apart = model.array(topology.partners(model, excluded), wp.int32)
         self.touching = Touching(model, rough=bool(columns["friction"].any()))
         self.neighbors.kept.append(self.touching)
         self.bouncing = bool(columns["restitution"].any())
@@ -149,6 +161,14 @@ class Contact(EasedConstraint):
         self.find_kernel = find_kernel(precision, model.periodic, Params)
         self.count_kernel = rows.crowding_kernel(precision, Params)
         self.push_kernel = rows.push_kernel(precision, Params, compensated)
+
+    def _excluded(self, w: int) -> np.ndarray:
+        """Pairs of world w that do not touch each other."""
+        given = self.peers[w].exclude
+        if given is True:
+            scene = self.model.scenes[w]
+            given = [each for each in scene.constraints if hasattr(each, topology.HELD)]
+        return topology.excluded(self.name, given)
 
     def _launch(self, kernel: wp.Kernel, inputs: Sequence[Any]) -> None:
         launch(kernel, self.count, [self.pairs.pairs, *inputs], self.model.device)
@@ -160,7 +180,9 @@ class Contact(EasedConstraint):
         model, slack = self.model, self.easing.slack
         measure, run_out = kernels.slack_kernels(model.precision, model.periodic)
         with when(self.easing.any_marked):
-            inputs = [model.box, self.easing.marked, self.bodies, self.radius, dt, slack]
+            inputs = [
+                model.box, self.easing.marked, self.apart, self.bodies, self.radius, dt, slack
+            ]  # fmt: skip
             self._launch(measure, inputs)
             call(self.easing.unmark)
         self._launch(run_out, [self.radius, self.easing.struct, dt, slack])
@@ -175,7 +197,8 @@ class Contact(EasedConstraint):
         ]  # fmt: skip
         self._launch(self.start_kernel, inputs)
         call(touching.hit.zero_)
-        self._launch(self.find_kernel, [self.model.box, self.params, self.bodies, dt, touching])
+        inputs = [self.model.box, self.params, self.apart, self.bodies, dt, touching]
+        self._launch(self.find_kernel, inputs)
 
     def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if not self.count or dt <= 0:
