@@ -1,4 +1,4 @@
-"""Contacts of particles: the copies that their pair passes read, and the overlap of a start."""
+"""Contacts of particles: what each starts a substep with, and the overlap of a start."""
 
 import functools
 from typing import Any
@@ -10,33 +10,56 @@ from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
 from ..precision import Precision, function, register, structure
 from .constraints import bodies_type
 
+REST = 2.0  # times the speed that forces add in a substep: who comes slower does not bounce
 
-def contact_types(precision: Precision) -> tuple[Any, Any]:
-    """Slot-ordered copies, and what the count of contacts writes."""
+
+@functools.cache
+def touching_type(precision: Precision) -> Any:
+    """Rows of who touches whom in a substep, by particle; each pair is in the rows of both.
+
+    A row and its multipliers are its particle's own: the two of a pair reckon alike, each by
+    itself, so that one thread writes what one particle reads.
+    """
     vec3, real = precision.vec3, precision.scalar
-    data = {
-        "x": wp.array(dtype=vec3),
-        "slot": wp.array(dtype=wp.int32),
+    fields = {
         "radius": wp.array(dtype=real),  # less the slack
+        "way": wp.array(dtype=vec3),  # of this substep, as far as it has come
+        "x": wp.array(dtype=vec3),  # where the substep began, as pairs see it
+        "v": wp.array(dtype=vec3),  # with which it began, before its forces
+        "calm": wp.array(dtype=real),  # the way of a substep up to which it rests
         "share": wp.array(dtype=real),  # w unit times the ways that normals are split
         "grip": wp.array(dtype=real),  # w unit times the ways that friction is split
-        "way": wp.array(dtype=vec3),  # of this substep; for bounces the velocity that it began with
-        "v": wp.array(dtype=vec3),  # for bounces
         "virial": wp.array(dtype=wp.float64),  # of each particle in this substep, twice its share
-        "inverse_dt": real,
+        "row": wp.array(dtype=wp.int64),  # where its row begins
+        "room": wp.array(dtype=wp.int32),  # entries of it that there is room for
+        "found": wp.array(dtype=wp.int32),  # that there are, or would be
+        "most": wp.array(dtype=wp.int32),  # in any substep since there was last made room
+        "overflow": wp.array(dtype=wp.int32),  # one: some row was full
+        # By world.
+        "hit": wp.array(dtype=wp.int32),  # something bounces in this substep
+        "running": wp.array(dtype=wp.int32),  # to be swept again
+        "unsettled": wp.array(dtype=wp.int32),  # some pair is still short of its distance
+        # The rows.
+        "partner": wp.array(dtype=wp.int32),
+        "x_ij": wp.array(dtype=vec3),  # of the pair where the substep began
+        "n": wp.array(dtype=vec3),  # and its direction
+        "rise": wp.array(dtype=real),  # how much farther apart a bounce takes the pair
+        "lam": wp.array(dtype=real),
+        "rub": wp.array(dtype=vec3),  # multiplier times direction of friction
         "unit": real,  # of mass, as of the bodies
-    }
-    shares = {
-        "share": wp.array(dtype=real),
-        "grip": wp.array(dtype=real),
-        "w": wp.array(dtype=real),
-        "unit": real,
         "relaxation": real,
+        "inverse_dt": real,  # 0 in a static projection
     }
-    return (
-        structure(f"ContactData_{precision.name}", data),
-        structure(f"ContactShares_{precision.name}", shares),
-    )
+    return structure(f"Touching_{precision.name}", fields)
+
+
+@function
+def excludes(partners: wp.array2d(dtype=wp.int32), i: int, j: int):
+    """Whether j is among the partners of i that it does not touch."""
+    for k in range(partners.shape[1]):
+        if partners[i, k] == j:
+            return True
+    return False
 
 
 @functools.cache
@@ -56,6 +79,7 @@ def slack_kernels(precision: Precision, periodic: Periodicity) -> tuple[wp.Kerne
         pairs: Pairs,
         box: wp.array(dtype=Box),
         marked: wp.array(dtype=wp.int32),
+        apart_of: wp.array2d(dtype=wp.int32),
         b: Bodies,
         radius: wp.array(dtype=real),
         dt: real,
@@ -73,7 +97,8 @@ def slack_kernels(precision: Precision, periodic: Periodicity) -> tuple[wp.Kerne
             j = pairs.order[pairs.index[pairs.row[c] + wp.int64(k) * pairs.entry_stride]]
             reach = radius[i] + radius[j]
             r = wp.length(image(x_i - (b.x[j] - b.v[j] * dt), box[world]))
-            if j != i and r < factor * reach and b.w[i] + b.w[j] > real(0.0):
+            deeper = j != i and r < factor * reach and b.w[i] + b.w[j] > real(0.0)
+            if deeper and not excludes(apart_of, i, j):
                 factor = r / reach
         slack_out[i] = radius[i] * (real(1.0) - factor)
 
@@ -85,11 +110,8 @@ def slack_kernels(precision: Precision, periodic: Periodicity) -> tuple[wp.Kerne
         easing: Easing,
         dt: real,
         slack_io: wp.array(dtype=real),
-        virial_out: wp.array(dtype=wp.float64),
     ):
-        """And the virial of a substep begins."""
         i = pairs.order[first + wp.tid()]
-        virial_out[i] = wp.float64(0.0)
         if slack_io[i] > real(0.0):
             slack_io[i] = ease(slack_io[i], radius[i], dt, easing)
 
@@ -115,63 +137,52 @@ def seen_function(precision: Precision, compensated: bool) -> wp.Function:
 
 
 @functools.cache
-def gather_kernel(precision: Precision, compensated: bool) -> wp.Kernel:
-    """Kernel: positions, radii and ways into slot order."""
-    real, seen = precision.scalar, seen_function(precision, compensated)
-    Bodies, (Data, _) = bodies_type(precision), contact_types(precision)
-
-    @register
-    def gather_contacts(
-        first: int,
-        pairs: Pairs,
-        b: Bodies,
-        radius: wp.array(dtype=real),
-        slack: wp.array(dtype=real),
-        eased: real,
-        dt: real,
-        follow: real,
-        d_out: Data,
-    ):
-        s = first + wp.tid()
-        i = pairs.order[s]
-        d_out.x[s] = seen(s, i, pairs, b)
-        d_out.radius[s] = radius[i] - eased * slack[i]
-        d_out.way[s] = b.v[i] * dt + b.correction[i] * follow
-
-    return gather_contacts
-
-
-@functools.cache
-def gather_bounce_kernel(precision: Precision, compensated: bool, forces: bool) -> wp.Kernel:
-    """Kernel: for a bounce, positions after integration and velocities as the substep began."""
+def start_kernel(precision: Precision, compensated: bool, forces: bool) -> wp.Kernel:
+    """Kernel: of each particle what is reckoned from where the substep began."""
     vec3, real = precision.vec3, precision.scalar
-    Bodies, (Data, _) = bodies_type(precision), contact_types(precision)
+    Bodies, Touching = bodies_type(precision), touching_type(precision)
     seen = seen_function(precision, compensated)
 
     @register
-    def gather_bounces(
+    def start_contacts(
         first: int,
         pairs: Pairs,
         b: Bodies,
         f: wp.array(dtype=vec3),
         radius: wp.array(dtype=real),
         slack: wp.array(dtype=real),
+        eased: real,
         dt: real,
-        inverse_dt: real,
-        d_out: Data,
+        follow: real,
+        t_out: Touching,
     ):
         s = first + wp.tid()
         i = pairs.order[s]
-        d_out.x[s] = seen(s, i, pairs, b) - b.correction[i]
-        d_out.radius[s] = radius[i] - slack[i]
         v = b.v[i]
-        d_out.v[s] = v
-        v = v - b.correction[i] * inverse_dt
+        way = v * dt + b.correction[i] * follow
+        t_out.way[i] = way
+        t_out.x[i] = seen(s, i, pairs, b) - way
+        t_out.radius[i] = radius[i] - eased * slack[i]
         if wp.static(forces):
             v = v - f[i] * (b.w[i] * dt)
-        d_out.way[s] = v
+        t_out.v[i] = v
+        t_out.calm[i] = real(REST) * wp.length(way - v * dt)
 
-    return gather_bounces
+    return start_contacts
+
+
+@functools.cache
+def way_kernel(precision: Precision) -> wp.Kernel:
+    """Kernel: how far each particle has come in this substep."""
+    real = precision.scalar
+    Bodies, Touching = bodies_type(precision), touching_type(precision)
+
+    @register
+    def take_ways(first: int, pairs: Pairs, b: Bodies, dt: real, follow: real, t_out: Touching):
+        i = pairs.order[first + wp.tid()]
+        t_out.way[i] = b.v[i] * dt + b.correction[i] * follow
+
+    return take_ways
 
 
 @functools.cache

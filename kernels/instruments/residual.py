@@ -7,6 +7,7 @@ import warp as wp
 from ..constraints.boundaries.meeting import Form, held_type, meeting_function
 from ..constraints.constraint_force import counted_function
 from ..constraints.constraints import Solved, bodies_type, rounding_function, view_function
+from ..constraints.contact import excludes
 from ..constraints.solving.unmet import lack_function, off_function
 from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
 from ..precision import Precision, register
@@ -100,6 +101,7 @@ def contact_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
         first: int,
         pairs: Pairs,
         box: wp.array(dtype=Box),
+        apart_of: wp.array2d(dtype=wp.int32),
         b: Bodies,
         radius: wp.array(dtype=real),
         miss_out: wp.array(dtype=real),
@@ -111,8 +113,10 @@ def contact_kernel(precision: Precision, periodic: Periodicity) -> wp.Kernel:
         for k in range(pairs.count[c]):
             j = pairs.order[pairs.index[pairs.row[c] + wp.int64(k) * pairs.entry_stride]]
             r = wp.length(image(b.x[i] - b.x[j], box[pairs.world[s]]))
-            if j != i and b.w[i] + b.w[j] > real(0.0):
-                deepest = wp.max(deepest, radius[i] + radius[j] - r)
+            deep = radius[i] + radius[j] - r
+            deeper = j != i and deep > deepest and b.w[i] + b.w[j] > real(0.0)
+            if deeper and not excludes(apart_of, i, j):
+                deepest = deep
         miss_out[s] = deepest
 
     return miss_contacts

@@ -10,39 +10,54 @@ import numpy as np
 import warp as wp
 
 from .. import validate
+from ..engine import topology
 from ..engine.easing import Easing
-from ..engine.execution.launch import call, launch, when
+from ..engine.execution.launch import call, launch, repeat, when
 from ..engine.limit import Limit
 from ..engine.model import Model
 from ..engine.neighbors.lists import Neighbors
 from ..engine.probe import Probe
 from ..engine.state import State
 from ..kernels.constraints import contact as kernels
-from ..kernels.constraints import contact_terms as terms
-from ..kernels.constraints.constraints import bodies_type
-from ..kernels.engine.loops import Term
-from ..kernels.interactions.pair import pair_kernel
+from ..kernels.constraints import contact_rows as rows
+from ..kernels.constraints.contact_search import find_kernel
 from .easing import EasedConstraint
 from .limits import contact_limits
+from .touching import Touching
 from .tuples import bodies
 
 CLOSEST = 1e-9  # parts of the cutoff: closer than this, particles count as coincident
+SWEEPS = 200  # of contacts that bounce, in each iteration, at most
 
 
 class Contact(EasedConstraint):
     """Particles keep apart: r >= R_i + R_j, with Coulomb friction and restitution.
 
-    All contacts of an iteration are solved at once from the same positions (Jacobi), each particle
-    taken as split among its contacts (Tonge et al. 2012): pair corrections are opposite and equal,
-    so momentum is conserved, and no number of contacts makes them overshoot. Friction takes back
-    the tangential way of the substep, up to mu times the normal correction (Macklin et al. 2014,
-    eq. 24); particles do not spin. Restitution sets velocities after the solve (Mueller et al.
-    2020, eq. 34).
+    Who touches whom is found once a substep, on the straight way that particles take in it. All
+    contacts of a sweep are solved at once (Jacobi), each particle taken as split among its contacts
+    (Tonge et al. 2012), so that no number of contacts makes them overshoot. Multipliers lam >= 0
+    add up over the sweeps of a substep:
+
+        dlam = (R_i + R_j - r - alpha~ lam) / (c_i w_i + c_j w_j + alpha~)
+
+    with the crowding c. Corrections of a pair are opposite and equal, and lie along its direction
+    where the substep began: momentum and angular momentum are kept to round-off, whatever the
+    number of contacts (as by SHAKE, Ryckaert et al. 1977). Friction takes back the tangential way
+    of the substep, up to mu lam (Macklin et al. 2014, eq. 24). Particles do not spin: friction
+    keeps momentum, and not the angular momentum that its couple would give to their spins.
+
+    What bounces is sent off where the substep began, a part of a substep early: with the speed v
+    before the substep's forces, v' n >= -e v n for all that touch, and no impulse where it is
+    more (Moreau 1988). This is swept until it holds to 1e-6 of the way, so that e = 1 keeps the
+    energy, of any number that touch at once, too: a row of balls that touch shares a blow among
+    all, a row with gaps passes it on to the last. What comes no faster than the forces of two
+    substeps would make it rests, and does not bounce.
 
     What overlaps at the start, or after positions were written, does not explode: the particles
     count as smaller, by just as much as leaves no overlap, and grow back within some 30 frames, at
-    no more than ``Settings.depenetration_speed``. A particle that passes through the middle of
-    another in one substep is stopped where it came from; one that passes it altogether is missed.
+    no more than ``Settings.depenetration_speed``. A particle that passes through another in one
+    substep is stopped where it came from; one that is out of the reach of the list of pairs
+    afterwards is missed.
 
     Radii may differ as they like: a large particle among many small ones costs no more than the
     contacts that it has, since who may touch whom is looked for by size.
@@ -54,8 +69,11 @@ class Contact(EasedConstraint):
         group: Which particles touch each other; None: all. Those of radius 0 are points.
         friction: mu, at least 0.
         restitution: e, 0 to 1: speed after over speed before.
-        compliance: Overlap over force [length / force], at least 0. A compliant contact is solved
-            once a substep, so that it does not depend on the iterations.
+        compliance: alpha, overlap over force [length / force], at least 0; alpha~ = alpha / dt^2.
+
+        exclude: Pairs that do not touch each other, (m, 2); or constraints and bonds that hold
+            them, one or several; True: whatever a constraint of the scene holds together, as for a
+            cloth that touches itself.
 
     Raises:
         ValueError: Values out of range.
@@ -70,7 +88,7 @@ class Contact(EasedConstraint):
 
     def __init__(
         self, group: Any = None, friction: float = 0.0, restitution: float = 0.0, *,
-        compliance: float = 0.0,
+        compliance: float = 0.0, exclude: Any = None,
     ):  # fmt: skip
         name = self.name
         self.group = group
@@ -81,9 +99,12 @@ class Contact(EasedConstraint):
         self.compliance = validate.number(
             name, "compliance", compliance, minimum=0.0, unit="length/force"
         )
+        self.exclude = exclude
+        if exclude is not True:
+            topology.excluded(name, exclude)  # which says what is wrong with it
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
-        self.model = model
+        self.model, self.neighbors = model, neighbors
         members = model.members([peer.group for peer in self.peers], self.name)
         self.members = members
         radius, world = model.column("radius")[members], model.world_of[members]
@@ -113,166 +134,109 @@ class Contact(EasedConstraint):
     def _column(self, name: str) -> np.ndarray:
         return np.array([getattr(peer, name) for peer in self.peers], dtype=float)
 
-    def _params(self, active: np.ndarray) -> tuple[Any, wp.array]:
-        """Parameters with which the worlds that are not ``active`` find no pairs."""
-        columns = {
-            "cutoff_squared": np.where(active, self.cutoff**2, 0.0),
-            "closest_squared": np.maximum(
-                (CLOSEST * self.cutoff) ** 2, np.finfo(self.model.precision.numpy).tiny
-            ),
-            **{name: self._column(name) for name in ("friction", "restitution", "compliance")},
-        }
-        return self.model.parameters("ContactParameters", columns)
-
     def attach(self, model: Model, state: State) -> None:
         if not self.count:
             return
         precision = model.precision
         self.bodies = bodies(model, state)
         self.radius = state.radius
-        self.forced = "force" in state
+        forced, compensated = "force" in state, "position_error" in state
         self.force = (
-            state.force if self.forced else wp.empty(0, dtype=precision.vec3, device=model.device)
+            state.force if forced else wp.empty(0, dtype=precision.vec3, device=model.device)
         )
-        self.compensated = "position_error" in state
         self.easing = Easing(model, state.count, precision.scalar, ends=2)
-        rough, hard = self._column("friction") > 0, self._column("compliance") == 0
-        bouncing = self._column("restitution") > 0
-        self.rough, self.bouncing = bool(rough.any()), bool(bouncing.any())
-        Data, Shares = kernels.contact_types(precision)
-        self.copies = {k: self.pairs.array(precision.vec3) for k in ("x", "way")}
-        self.copies |= {k: self.pairs.array(precision.scalar) for k in ("radius", "share")}
-        if self.rough:
-            self.copies["grip"] = self.pairs.array(precision.scalar)
-        if self.bouncing:
-            self.copies["v"] = self.pairs.array(precision.vec3)
-        self.Data = Data
-        self.virial = wp.zeros(model.particle_count, dtype=wp.float64, device=model.device)
-        self.shares, self.bounce_shares = Shares(), Shares()
-        for shares, relaxation in (
-            (self.shares, model.settings.relaxation), (self.bounce_shares, 1.0)
-        ):  # fmt: skip
-            shares.share, shares.w = self.copies["share"], state.inverse_mass
-            shares.unit, shares.relaxation = model.mass_unit, relaxation
-        if self.rough:
-            self.shares.grip = self.bounce_shares.grip = self.copies["grip"]
-        self.everywhere = self._params(np.ones_like(rough))
-        self.bounce_params = self._params(bouncing)
-        # A world is solved by the kernel that it would be solved by alone. First come the passes of
-        # the first sweep, then those of all others, from which compliant contacts are left out.
-        self.passes = [
-            [
-                (self._push_kernel(with_friction), self._params(chosen)[1])
-                for with_friction, chosen in ((False, ~rough & also), (True, rough & also))
-                if chosen.any()
-            ]
-            for also in (np.ones_like(rough), hard)
-        ]
-        self.count_kernel, self.count_bounces = (
-            self._kernel(
-                terms.crowding_term(precision, self._Params, bounce),
-                terms.store_share,
-                Shares,
-            )
-            for bounce in (False, True)
+        tiny = np.finfo(precision.numpy).tiny
+        columns = {
+            "closest_squared": np.maximum((CLOSEST * self.cutoff) ** 2, tiny),
+            **{name: self._column(name) for name in ("friction", "restitution", "compliance")},
+        }
+        Params, self.params = model.parameters("ContactParameters", columns)
+        excluded = topology.merged(
+            self.name, "exclude", model, [self._excluded(w) for w in range(model.world_count)]
         )
-        self.bounce_kernel = self._kernel(
-            terms.bounce_term(precision, self._Params), terms.store_impulse,
-            bodies_type(precision),
-        )  # fmt: skip
+        self.apart = model.array(topology.partners(model, excluded), wp.int32)
+        self.touching = Touching(model, rough=bool(columns["friction"].any()))
+        self.neighbors.kept.append(self.touching)
+        self.bouncing = bool(columns["restitution"].any())
+        self.start_kernel = kernels.start_kernel(precision, compensated, forced)
+        self.find_kernel = find_kernel(precision, model.periodic, Params)
+        self.count_kernel = rows.crowding_kernel(precision, Params)
+        self.push_kernel = rows.push_kernel(precision, Params, compensated)
 
-    @property
-    def _Params(self) -> Any:
-        return self.everywhere[0]
+    def _excluded(self, w: int) -> np.ndarray:
+        """Pairs of world w that do not touch each other."""
+        given = self.peers[w].exclude
+        if given is True:
+            scene = self.model.scenes[w]
+            given = [each for each in scene.constraints if hasattr(each, topology.HELD)]
+        return topology.excluded(self.name, given)
 
-    def _kernel(self, term: Term, store: Any, out: Any) -> wp.Kernel:
-        model = self.model
-        return pair_kernel(
-            term, store(model.precision, self._Params), self.Data, self._Params, out,
-            model.precision, model.periodic, self.pairs.partners, model.vectorised,
-        )  # fmt: skip
-
-    def _push_kernel(self, friction: bool) -> wp.Kernel:
-        precision = self.model.precision
-        return self._kernel(
-            terms.contact_term(precision, self._Params, friction),
-            lambda *types: terms.store_correction(*types, self.compensated),
-            bodies_type(precision),
-        )  # fmt: skip
+    def _launch(self, kernel: wp.Kernel, inputs: Sequence[Any]) -> None:
+        launch(kernel, self.count, [self.pairs.pairs, *inputs], self.model.device)
 
     def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        self.sweep = 0
         # A static projection goes by the radii as they are, and leaves the marks to the first step.
         if not self.count or math.isinf(dt) or dt <= 0:
             return
-        model, pairs = self.model, self.pairs.pairs
+        model, slack = self.model, self.easing.slack
         measure, run_out = kernels.slack_kernels(model.precision, model.periodic)
-        slack = self.easing.slack
         with when(self.easing.any_marked):
-            launch(
-                measure,
-                self.count,
-                [pairs, model.box, self.easing.marked, self.bodies, self.radius, dt, slack],
-                model.device,
-            )
+            inputs = [
+                model.box, self.easing.marked, self.apart, self.bodies, self.radius, dt, slack
+            ]  # fmt: skip
+            self._launch(measure, inputs)
             call(self.easing.unmark)
-        inputs = [pairs, self.radius, self.easing.struct, dt, slack, self.virial]
-        launch(run_out, self.count, inputs, model.device)
+        self._launch(run_out, [self.radius, self.easing.struct, dt, slack])
+        self._find(dt, 1.0)
 
-    def _data(self, dt: float) -> Any:
-        """The copies in slot order, as the terms take them."""
-        data = self.Data()
-        data.slot = self.pairs.slots
-        for name, array in self.copies.items():
-            setattr(data, name, array)
-        data.virial, data.inverse_dt, data.unit = self.virial, 1.0 / dt, self.model.mass_unit
-        return data
-
-    def _sum(self, kernel: wp.Kernel, params: wp.array, data: Any, out: Any) -> None:
-        inputs = [self.pairs.pairs, self.model.box, params, data, out]
-        self.pairs.sum(kernel, inputs)
+    def _find(self, dt: float, moving: float) -> None:
+        """The pairs that touch from now on, on the way of ``dt``, in a static projection of 0."""
+        touching = self.touching.struct
+        touching.inverse_dt = 1.0 / dt if moving else 0.0
+        inputs = [
+            self.bodies, self.force, self.radius, self.easing.slack, moving, dt, moving, touching
+        ]  # fmt: skip
+        self._launch(self.start_kernel, inputs)
+        call(touching.hit.zero_)
+        inputs = [self.model.box, self.params, self.apart, self.bodies, dt, touching]
+        self._launch(self.find_kernel, inputs)
 
     def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        passes = self.passes[min(self.sweep, 1)] if self.count and dt > 0 else []
-        self.sweep += 1
-        if not passes:
+        if not self.count or dt <= 0:
             return
-        model, data = self.model, self._data(dt)
         moving = not math.isinf(dt)
-        gather = kernels.gather_kernel(model.precision, self.compensated)
-        launch(
-            gather,
-            self.count,
-            [self.pairs.pairs, self.bodies, self.radius, self.easing.slack, float(moving),
-             dt if moving else 0.0, float(moving), data],
-            model.device,
-        )  # fmt: skip
-        self._sum(self.count_kernel, self.everywhere[1], data, self.shares)
-        for kernel, params in passes:
-            self._sum(kernel, params, data, self.bodies)
+        if not moving:
+            self._find(0.0, 0.0)
+        self._sweep(dt, moving)
+        if self.bouncing and moving:
+            self._decide()
+            with repeat(self.touching.flag):
+                self._sweep(dt, moving)
+                self._decide()
+            call(self.touching.run)
 
-    def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        if not self.count or not self.bouncing or dt <= 0:
-            return
-        model, data = self.model, self._data(dt)
-        gather = kernels.gather_bounce_kernel(model.precision, self.compensated, self.forced)
-        launch(
-            gather,
-            self.count,
-            [self.pairs.pairs, self.bodies, self.force, self.radius, self.easing.slack, dt,
-             1.0 / dt, data],
-            model.device,
-        )  # fmt: skip
-        self._sum(self.count_bounces, self.bounce_params[1], data, self.bounce_shares)
-        self._sum(self.bounce_kernel, self.bounce_params[1], data, self.bodies)
+    def _sweep(self, dt: float, moving: bool) -> None:
+        touching, own = self.touching.struct, dt if moving else 0.0
+        take = kernels.way_kernel(self.model.precision)
+        self._launch(take, [self.bodies, own, float(moving), touching])
+        self._launch(self.count_kernel, [self.params, self.bodies, touching])
+        self._launch(self.push_kernel, [self.params, own, touching, self.bodies])
+
+    def _decide(self) -> None:
+        """Which worlds are swept again."""
+        model, touching = self.model, self.touching
+        call(touching.flag.zero_)
+        inputs = [SWEEPS, touching.struct, touching.sweeps, touching.flag]
+        launch(rows.decide_kernel(model.precision), model.world_count, inputs, model.device)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         """Add the virial of the last substep's contacts."""
         if self.count:
-            launch(kernels.share_kernel(), len(virial), [self.virial, virial], self.model.device)
+            inputs = [self.touching.struct.virial, virial]
+            launch(kernels.share_kernel(), len(virial), inputs, self.model.device)
 
     def readable(self) -> dict[str, wp.array]:
-        return {"virial": self.virial} if self.count else {}
+        return {"virial": self.touching.struct.virial} if self.count else {}
 
     def reset(self, worlds: Sequence[int]) -> None:
         super().reset(worlds)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,6 +10,9 @@ import numpy as np
 
 from .. import validate
 from .model import Model
+
+# What parts call the particles that they hold: bonds, and constraints.
+BONDS, HELD = ("pairs", "triples", "quadruples"), "particles"
 
 
 def tuples(owner: str, argument: str, value: Any, arity: int | None) -> np.ndarray:
@@ -172,3 +176,39 @@ def colors(index: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
         for particle in particles:
             used[particle] = used.get(particle, 0) | free
     return result
+
+
+def excluded(owner: str, exclude: Any) -> np.ndarray:
+    """Pairs that do not feel each other, (m, 2): given, or held together by parts.
+
+    Of a bond they are its ends, of a tuple of a constraint all that are in it.
+    """
+    given = [] if exclude is None else exclude
+    several = isinstance(given, Sequence) and all(_holds(each) for each in given)
+    found = [np.zeros((0, 2), dtype=np.int64)]
+    for each in given if several else [given]:
+        name = next((name for name in BONDS if hasattr(each, name)), None)
+        if hasattr(each, HELD):
+            rows = getattr(each, HELD)
+            seats = itertools.combinations(range(rows.shape[1]), 2)
+            found += [rows[:, list(two)] for two in seats]
+            continue
+        # Of more than two those at the ends: who is between is held by bonds.
+        pairs = each if name is None else np.asarray(getattr(each, name))[:, [0, -1]]
+        found.append(tuples(owner, "exclude", pairs, 2))
+    return np.concatenate(found)
+
+
+def _holds(value: Any) -> bool:
+    """It is a part that holds tuples, or pairs by themselves."""
+    return any(hasattr(value, name) for name in (*BONDS, HELD)) or np.ndim(value) == 2
+
+
+def partners(model: Model, pairs: np.ndarray) -> np.ndarray:
+    """By particle its partners in these pairs, (n, most); -1 where there are fewer."""
+    both = np.unique(np.concatenate([pairs, pairs[:, ::-1]]), axis=0)
+    count = np.bincount(both[:, 0], minlength=model.particle_count)
+    rows = np.full((model.particle_count, int(count.max(initial=0))), -1)
+    begin = np.cumsum(count) - count
+    rows[both[:, 0], np.arange(len(both)) - begin[both[:, 0]]] = both[:, 1]
+    return rows

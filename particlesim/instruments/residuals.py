@@ -86,7 +86,7 @@ def _of_contacts(constraint: Contact, sim: Source) -> tuple[np.ndarray, np.ndarr
         return None
     model, pairs = sim.model, constraint.pairs.pairs
     kernel = kernels.contact_kernel(model.precision, model.periodic)
-    inputs = [pairs, model.box, constraint.bodies, constraint.radius]
+    inputs = [pairs, model.box, constraint.apart, constraint.bodies, constraint.radius]
     return _run(kernel, constraint.count, inputs, sim), pairs.world.numpy()
 
 

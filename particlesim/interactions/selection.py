@@ -16,8 +16,6 @@ from ..kernels.interactions.calls import CUT
 from ..kernels.interactions.selection import WITHIN, Selection, excluded_type, place
 from ..scene.group import Group, select
 
-TUPLES = ("pairs", "triples", "quadruples")  # what parts call the particles that they hold
-
 
 class Chosen:
     """Kinds, tables and exclusions of a :class:`~particlesim.interactions.pair.Pair`.
@@ -65,9 +63,7 @@ class Chosen:
             name: float(self.tables[name][0, 0]) if name in self.tables else value
             for name, value in parameters.items()
         }
-        given = [] if exclude is None else exclude
-        several = isinstance(given, Sequence) and all(_holds(each) for each in given)
-        self.exclude = list(given) if several else [given]
+        self.exclude = exclude
 
     @property
     def _names(self) -> str:
@@ -137,7 +133,7 @@ class Chosen:
             ]
             self.kind_of = model.array(np.concatenate(kinds), model.precision.scalar)
             self.held["kind"] = pairs.hold(self.kind_of)
-        rows = _partners(model, topology.merged(
+        rows = topology.partners(model, topology.merged(
             self.owner, "exclude", model, [peer.chosen.excluded() for peer in peers]
         ))  # fmt: skip
         most = rows.shape[1]
@@ -165,23 +161,7 @@ class Chosen:
 
     def excluded(self) -> np.ndarray:
         """Excluded pairs of a scene, (m, 2)."""
-        found = [np.zeros((0, 2), dtype=np.int64)]
-        for each in self.exclude:
-            name = next((name for name in TUPLES if hasattr(each, name)), None)
-            # Of more than two those at the ends: who is between is held by bonds.
-            given = each if name is None else np.asarray(getattr(each, name))[:, [0, -1]]
-            found.append(topology.tuples(self.owner, "exclude", given, 2))
-        return np.concatenate(found)
-
-
-def _partners(model: Model, pairs: np.ndarray) -> np.ndarray:
-    """By particle its partners in these pairs, (n, most); -1 where there are fewer."""
-    both = np.unique(np.concatenate([pairs, pairs[:, ::-1]]), axis=0)
-    count = np.bincount(both[:, 0], minlength=model.particle_count)
-    rows = np.full((model.particle_count, int(count.max(initial=0))), -1)
-    begin = np.cumsum(count) - count
-    rows[both[:, 0], np.arange(len(both)) - begin[both[:, 0]]] = both[:, 1]
-    return rows
+        return topology.excluded(self.owner, self.exclude)
 
 
 def kinds_of(scene: Any, kinds: Sequence[Any], owner: str, argument: str) -> np.ndarray:
@@ -202,8 +182,3 @@ def are_groups(value: Any) -> bool:
     """It is a list of groups or of their names."""
     listed = isinstance(value, list | tuple) and len(value) > 0
     return listed and all(isinstance(each, Group | str) for each in value)
-
-
-def _holds(value: Any) -> bool:
-    """It is a part that holds tuples, or pairs by themselves."""
-    return any(hasattr(value, name) for name in TUPLES) or np.ndim(value) == 2

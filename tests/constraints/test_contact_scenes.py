@@ -111,6 +111,30 @@ def test_empty_group_and_world_of_points(device, simulate):
         assert np.array_equal(sim.world(k).position, [(0, 0, 0), (0.9, 0, 0)])
 
 
+@pytest.mark.parametrize("how", ["pairs", "part", "True"])
+def test_who_is_excluded_does_not_touch(how, device, simulate):
+    """A chain of overlapping beads stays as it is, and beads that are not next to each other part.
+
+    In the second world of the two nothing is excluded: its chain is pushed apart.
+    """
+    scenes = []
+    for k in range(2):
+        scene = ps.Scene()
+        scene.add_particles([(0, 0, 0), (0.6, 0, 0), (0.6, 0.6, 0), (0, 0.7, 0)], radius=0.5)
+        links = [(0, 1), (1, 2), (2, 3)]
+        chain = scene.add_constraint(ps.Distance(links))
+        given = {"pairs": links, "part": chain, "True": True}[how] if k == 0 else None
+        scene.add_constraint(ps.Contact(exclude=given))
+        scenes.append(scene)
+    sim = simulate(scenes, device, dt=1 / 60, iterations=20)
+    sim.run(300)
+    x = sim.world(0).position
+    lengths = np.linalg.norm(np.diff(x, axis=0), axis=1)
+    assert np.allclose(lengths, [0.6, 0.6, np.hypot(0.6, 0.1)], rtol=0, atol=1e-6)
+    assert np.linalg.norm(x[0] - x[3]) > 1 - 1e-3
+    assert np.linalg.norm(sim.world(1).position[0] - sim.world(1).position[1]) > 0.61
+
+
 def test_no_time_passes(device, simulate, grains):
     """A substep of nothing changes nothing."""
     sim = simulate(grains([(0, 0, 0), (0.5, 0, 0)], contact={"restitution": 0.5}), device)
@@ -133,6 +157,7 @@ def test_static_projection(device, simulate, grains):
         ({"friction": -0.1}, "Contact: friction must be at least 0, got -0.1"),
         ({"friction": np.nan}, "Contact: friction must be finite"),
         ({"restitution": 1.5}, "Contact: restitution must be at most 1, got 1.5"),
+        ({"exclude": [(0, 0)]}, "Contact: exclude"),
         ({"compliance": -1.0}, r"Contact: compliance must be at least 0 \[length/force\]"),
     ],
 )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -50,6 +51,25 @@ class Request:
         return (self.leader != other.leader) & (self.leader >= 0) & (other.leader >= 0)
 
 
+class Rows:
+    """Rows that are found in each substep, and made longer where they were too short.
+
+    ``generation`` changes when they have moved to new arrays; ``overflow`` is set where one was
+    full.
+    """
+
+    generation: int
+    overflow: wp.array
+
+    def lengthen(self) -> bool:
+        """If a row was full: make room for as many as were found."""
+        raise NotImplementedError
+
+    def grow(self) -> bool:
+        """If a row was full: make them longer, and again."""
+        raise NotImplementedError
+
+
 class Neighbors:
     """The pair lists of a simulation, shared by all who can share them."""
 
@@ -57,6 +77,7 @@ class Neighbors:
         self.model = model
         self.lists: list[AllPairs] = []
         self.verlet: list[VerletList] = []  # those with rows
+        self.kept: list[Rows] = []  # what parts find by these lists in each substep
         self.requests: list[Request] = []
         self._of: dict[int, AllPairs] = {}
 
@@ -205,23 +226,27 @@ class Neighbors:
             each.renew(state, worlds)
 
     @property
+    def _rows(self) -> list[Any]:
+        return [*self.verlet, *self.kept]
+
+    @property
     def generation(self) -> int:
         """Changes when rows have moved to new arrays; what was recorded before is then void."""
-        return sum(each.generation for each in self.verlet)
+        return sum(each.generation for each in self._rows)
 
     @property
     def overflowing(self) -> bool:
         """Some row was full."""
-        return any(each.overflow.numpy()[0] for each in self.verlet)
+        return any(each.overflow.numpy()[0] for each in self._rows)
 
     def lengthen(self) -> None:
         """Make room in the rows that were full; whoever calls has them made again."""
-        for each in self.verlet:
+        for each in self._rows:
             each.lengthen()
 
     def grow(self) -> bool:
         """Lengthen the rows that were full; True if some were and the step must be redone."""
-        return any([each.grow() for each in self.verlet])
+        return any([each.grow() for each in self._rows])
 
 
 def _alike(new: Request, other: Request) -> np.ndarray:

@@ -1,0 +1,205 @@
+"""Contacts of particles: a sweep over the pairs that touch in a substep.
+
+Sweeps are Jacobi: a thread reads what the sweep began with and writes its own particle, whatever
+the order of the threads. Averaging is by mass splitting (Tonge, Benevolenski and Voroshilov 2012):
+a particle with n contacts counts as n times as light in each, which keeps corrections opposite and
+equal. Instead of n, the largest eigenvalue of the sum of n n^T over the normals is enough for
+corrections that never overshoot (the sum of lam n is then bounded by what is split); it is n for
+contacts in a line and n/3 for contacts all around.
+"""
+
+import functools
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ..engine.loops import Pairs
+from ..precision import Precision, function, register
+from .constraints import bodies_type, place_function, rounding_function
+from .contact import touching_type
+
+SETTLED = 1e-6  # parts of its way that a bounce may be short of
+ROUNDINGS = 8.0  # of the distance of a pair, besides
+
+
+def largest_eigenvalue(precision: Precision) -> wp.Function:
+    """An upper bound of the largest eigenvalue of a positive symmetric matrix of six entries.
+
+    (sum lambda^8)^(1/8), by squaring twice: exact for one direction, at most 15 % too much.
+    """
+    real, six = precision.scalar, precision.vector(6)
+
+    def squared(t: six):
+        return six(
+            t[0] * t[0] + t[1] * t[1] + t[2] * t[2],
+            t[0] * t[1] + t[1] * t[3] + t[2] * t[4],
+            t[0] * t[2] + t[1] * t[4] + t[2] * t[5],
+            t[1] * t[1] + t[3] * t[3] + t[4] * t[4],
+            t[1] * t[2] + t[3] * t[4] + t[4] * t[5],
+            t[2] * t[2] + t[4] * t[4] + t[5] * t[5],
+        )
+
+    square = function(squared)
+
+    def bound(t: six):
+        trace = t[0] + t[3] + t[5]
+        q = square(square(t * (real(1.0) / wp.where(trace > real(0.0), trace, real(1.0)))))
+        off = q[1] * q[1] + q[2] * q[2] + q[4] * q[4]
+        norm = q[0] * q[0] + q[3] * q[3] + q[5] * q[5] + real(2.0) * off
+        return trace * wp.sqrt(wp.sqrt(wp.sqrt(norm)))
+
+    return function(bound)
+
+
+@functools.cache
+def _missing_function(precision: Precision) -> wp.Function:
+    """``missing(at, way_i, R_i, t) -> (lack, u)``: how far an entry's pair is short of its
+    distance, and its way in this substep.
+
+    A bounce sends it off along the direction of the start, by e times the way it came.
+    """
+    vec3, real, Touching = precision.vec3, precision.scalar, touching_type(precision)
+
+    def missing(at: wp.int64, way_i: vec3, R_i: real, t: Touching):
+        j, n, x_ij = t.partner[at], t.n[at], t.x_ij[at]
+        u = way_i - t.way[j]
+        reach, rise = R_i + t.radius[j], t.rise[at]
+        y = x_ij + u
+        r, along = wp.length(y), wp.dot(n, y)
+        # Past the middle the distance is no measure.
+        lack = reach - wp.where(along < real(0.5) * r, along, r)
+        if rise > real(0.0):
+            lack = wp.max(reach - wp.dot(n, x_ij), rise) - wp.dot(n, u)
+        return lack, u
+
+    return function(missing)
+
+
+@functools.cache
+def crowding_kernel(precision: Precision, params: Any) -> wp.Kernel:
+    """Kernel: w times the ways in which normals are split, and friction.
+
+    Energy cannot grow if in no direction more than the whole of an error is taken back, for a
+    share of crowding / split_normal by normals and (n - crowding) / split_friction by friction.
+    Without friction that is split_normal = crowding. With friction and a = 1 - crowding / n, 0 for
+    contacts in a line and 2/3 all around, split_friction = n / (1 - 3/4 a) leaves normals
+    crowding / (1 - a + 3/4 a^2): exact for contacts in a line, even-handed all around.
+    """
+    real, six = precision.scalar, precision.vector(6)
+    Bodies, Touching = bodies_type(precision), touching_type(precision)
+    eigenvalue, missing = largest_eigenvalue(precision), _missing_function(precision)
+
+    @register
+    def count_contacts(
+        first: int, pairs: Pairs, parameters: wp.array(dtype=params), b: Bodies, t: Touching,
+    ):  # fmt: skip
+        s = first + wp.tid()
+        i = pairs.order[s]
+        world = pairs.world[s]
+        p = parameters[world]
+        count = wp.min(t.found[i], t.room[i])
+        if count == 0 or t.running[world] == 0:
+            return
+        way_i, R_i, total = t.way[i], t.radius[i], six()
+        for k in range(count):
+            at = t.row[i] + wp.int64(k)
+            lack, _u = missing(at, way_i, R_i, t)
+            if lack > real(0.0) or t.lam[at] > real(0.0):
+                m = t.n[at]
+                total += six(
+                    m[0] * m[0], m[0] * m[1], m[0] * m[2], m[1] * m[1], m[1] * m[2], m[2] * m[2]
+                )
+        w = b.w[i] * t.unit / t.relaxation
+        crowding = eigenvalue(total)
+        split = crowding
+        if p.friction > real(0.0):
+            n = total[0] + total[3] + total[5]
+            a = real(1.0) - crowding / wp.max(n, real(1.0))
+            ease = real(0.75) * a
+            split = crowding / (real(1.0) - a + a * ease)
+            t.grip[i] = w * n / (real(1.0) - ease)
+        t.share[i] = w * split
+
+    return count_contacts
+
+
+@functools.cache
+def push_kernel(precision: Precision, params: Any, compensated: bool) -> wp.Kernel:
+    """Kernel: multipliers of all pairs grow by what is missing, and particles move by w n dlam.
+
+        dlam = (missing - alpha~ lam) / (c_i w_i + c_j w_j + alpha~),    lam >= 0
+
+    along the direction n of the start, c the crowding. Friction takes back the tangential way of
+    the substep, split among the contacts too, with at most mu lam in all (Macklin et al. 2014,
+    eq. 24).
+    """
+    vec3, real = precision.vec3, precision.scalar
+    Bodies, Touching = bodies_type(precision), touching_type(precision)
+    missing = _missing_function(precision)
+    tiny = real(ROUNDINGS * float(np.finfo(precision.numpy).eps))
+    kept, place = rounding_function(precision, compensated), place_function(precision, compensated)
+
+    @register
+    def push_contacts(
+        first: int, pairs: Pairs, parameters: wp.array(dtype=params), dt: real, t: Touching,
+        b: Bodies,
+    ):  # fmt: skip
+        s = first + wp.tid()
+        i = pairs.order[s]
+        world = pairs.world[s]
+        p = parameters[world]
+        count = wp.min(t.found[i], t.room[i])
+        if count == 0 or t.running[world] == 0:
+            return
+        way_i, R_i, share_i = t.way[i], t.radius[i], t.share[i]
+        alpha = p.compliance * t.inverse_dt * t.unit * t.inverse_dt
+        total, w, virial = vec3(), b.w[i] * t.unit, wp.float64(0.0)
+        for k in range(count):
+            at = t.row[i] + wp.int64(k)
+            lack, u = missing(at, way_i, R_i, t)
+            n, lam, j = t.n[at], t.lam[at], t.partner[at]
+            if lack > real(0.0) or lam > real(0.0):
+                change = (lack - alpha * lam) / (share_i + t.share[j] + alpha)
+                more = wp.max(lam + change, real(0.0))
+                total += n * (more - lam)
+                way = wp.max(wp.length(t.v[i]), wp.length(t.v[j])) * dt
+                fine = real(SETTLED) * way + tiny * (R_i + t.radius[j])
+                if wp.abs(lack - alpha * more) > fine and share_i + t.share[j] > real(0.0):
+                    t.unsettled[world] = 1
+                t.lam[at] = more
+                if p.friction > real(0.0):
+                    rub = t.rub[at] - (u - n * wp.dot(u, n)) / (t.grip[i] + t.grip[j])
+                    most, length = p.friction * more, wp.length(rub)
+                    if length > most:
+                        rub = rub * (most / length)
+                    total += rub - t.rub[at]
+                    t.rub[at] = rub
+                virial += wp.float64(more * wp.dot(n, t.x_ij[at]))
+        rate = wp.float64(t.inverse_dt)
+        t.virial[i] = virial * rate * rate * wp.float64(t.unit)
+        if w > real(0.0):
+            place(i, b.x[i], kept(i, b), total * w, b)
+
+    return push_contacts
+
+
+@functools.cache
+def decide_kernel(precision: Precision) -> wp.Kernel:
+    """Kernel, by world: whether to sweep again, ``most`` times at most."""
+    Touching = touching_type(precision)
+
+    @register
+    def decide_contacts(
+        first: int, most: int, t: Touching, sweeps_io: wp.array(dtype=wp.int32),
+        flag_out: wp.array(dtype=wp.int32),
+    ):  # fmt: skip
+        w = first + wp.tid()
+        sweeps_io[w] = sweeps_io[w] + 1
+        if t.unsettled[w] == 0 or t.hit[w] == 0 or sweeps_io[w] >= most:
+            t.running[w] = 0
+        t.unsettled[w] = 0
+        if t.running[w] != 0:
+            flag_out[0] = 1
+
+    return decide_contacts
