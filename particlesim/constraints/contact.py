@@ -23,6 +23,7 @@ from ..kernels.constraints import contact_rows as rows
 from ..kernels.constraints.contact_search import find_kernel
 from .easing import EasedConstraint
 from .limits import contact_limits
+from .solving.contact_bounce import ContactBounce
 from .touching import Touching
 from .tuples import bodies
 
@@ -162,6 +163,9 @@ class Contact(EasedConstraint):
         self.find_kernel = find_kernel(precision, model.periodic, Params)
         self.count_kernel = rows.crowding_kernel(precision, Params)
         self.push_kernel = rows.push_kernel(precision, Params, compensated)
+        # Particles by themselves have bounced off when they are projected.
+        bodies_here = any(each.rank == 0 for each in model.scenes[0].constraints)
+        self.through_bodies = ContactBounce(self) if self.bouncing and bodies_here else None
 
     def _excluded(self, w: int) -> np.ndarray:
         """Pairs of world w that do not touch each other."""
@@ -228,6 +232,18 @@ class Contact(EasedConstraint):
         call(touching.flag.zero_)
         inputs = [SWEEPS, touching.struct, touching.sweeps, touching.flag]
         launch(rows.decide_kernel(model.precision), model.world_count, inputs, model.device)
+
+    @property
+    def bounces(self) -> bool:
+        return bool(self.count) and self.through_bodies is not None
+
+    def start_bounce(self, state: State, neighbors: Neighbors, bounces: Any, dt: float) -> None:
+        if self.count and self.through_bodies:
+            self.through_bodies.start(bounces)
+
+    def bounce(self, state: State, neighbors: Neighbors, bounces: Any, dt: float) -> None:
+        if self.count and self.through_bodies:
+            self.through_bodies.sweep(bounces)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         """Add the virial of the last substep's contacts."""
