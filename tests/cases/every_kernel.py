@@ -137,6 +137,23 @@ def heated(**options):
     return fluid(None, equation_of_state=ps.IdealGas(1.4), viscosity=thick, **options)
 
 
+def kinds():
+    """One constraint of each kind on tuples."""
+    scene = particles()
+    soft, four = {"compliance": 0.1}, [(9, 10, 11, 12)]
+    for part in (
+        ps.Bending(four, 0.1, **soft),
+        ps.IsometricBending(four, **soft),
+        ps.Angle([(9, 10, 11)], 1.0, **soft),
+        ps.Area([(9, 10, 11)], 1.0, **soft),
+        ps.Volume(four, 1.0, **soft),
+        ps.NeoHookean(four, 1.0, 0.3),
+        ps.Attachment([13], [(0, 0, 0), (1, 0, 0)], times=[0.0, 1.0], **soft),
+    ):
+        scene.add_constraint(part)
+    return scene
+
+
 def constrained(periodic, *, breaks, bounces):
     scene = particles(periodic=periodic)
     limit = {"break_force": 1.0} if breaks else {}
@@ -224,6 +241,7 @@ SCENES = {
     "boundaries": (held, {}),
     "breaking": (lambda: constrained(BOX, breaks=True, bounces=False), {"compensated": False}),
     "clusters": (clustered, {"compensated": False}),
+    "kinds": (lambda: kinds(), {}),
     "tree": (lambda: attracted(0.1), {"opening_angle": 0.5}),
     "own_softening": (lambda: attracted(None, softening=0.1), {"opening_angle": 0.5}),
     **{name: (lambda name=name: load_scene(name).build(), {}) for name in ready_scenes()},
