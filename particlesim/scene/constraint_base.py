@@ -49,7 +49,9 @@ class ConstraintBase(Part):
     """
 
     rank = 0  # of what is swept first: 0 holds bodies together, 1 apart, 2 within boundaries
-    rigid_bodies = False  # an impulse goes through what it holds at once: what hits it is an impulse
+    rigid_bodies = (
+        False  # an impulse goes through what it holds at once: what hits it is an impulse
+    )
     solid = False  # it is what holds a continuum, and has ``wall``
 
     def wall(self, model: Any, state: Any) -> Any:
