@@ -11,7 +11,7 @@ from ..engine.model import Model
 from ..engine.neighbors.lists import Rows
 from ..kernels.constraints.contact import touching_type
 
-FEW = 4  # entries of a row to begin with
+FEW = 8  # entries of a row to begin with
 
 
 class Touching(Rows):

@@ -36,6 +36,7 @@ from .limits import GROWN, Limits
 
 DRIFT = 0.1  # of the largest kinetic energy
 DEEP = 0.2  # of a radius
+THROUGH = 1.0  # radii: who is so deep is on its way through
 FIRST = 8  # frames: what is ahead of a start is looked at as a run begins
 SHARE = 50  # times its own cost, from one round to the next
 ROUND = 6e6  # what a round costs beside three evaluations of the forces, in pairs of these
@@ -139,7 +140,7 @@ class Rounds:
         return f"use more substeps than {settings.substeps}"
 
     def _constraints(self) -> None:
-        """Tell of what was missed in the last round, too."""
+        """Tell of what was missed in the last round, too, or is by more than a radius."""
         loop, missed = self.loop, set()
         with undisturbed(loop):
             loop.neighbors.update_for_constraints(loop.state)
@@ -148,11 +149,12 @@ class Rounds:
                 for worst, world, what, most in _unmet(constraint, loop):
                     for w in np.unique(world[worst > most]).tolist():
                         missed.add((id(constraint), w))
-                        if (id(constraint), w) in self.missed:
-                            size = f"{worst[world == w].max():.2g}"
+                        size = worst[world == w].max()
+                        within = most == DEEP and size > THROUGH
+                        if within or (id(constraint), w) in self.missed:
                             must = f"{constraint.name} must hold within {most:.0%} of {what}"
                             remedy = "use more substeps or iterations, or see whether it can hold"
-                            self._tell(id(constraint), w, f"{must}, got {size} of it", remedy)
+                            self._tell(id(constraint), w, f"{must}, got {size:.2g} of it", remedy)
         self.missed = missed
 
     def _tell(self, about: Any, w: int, must: str, remedy: str) -> None:
