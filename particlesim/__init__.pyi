@@ -18,6 +18,7 @@ from .constraints.clusters.shape_matching import ShapeMatching
 from .constraints.constraint import Constraint
 from .constraints.contact import Contact
 from .constraints.distance import Distance
+from .constraints.fluids.density import FluidDensity
 from .constraints.force import ConstraintForce
 from .constraints.scene import Scene
 from .engine.execution.launch import launch
@@ -125,6 +126,7 @@ __all__ = [
     "EquationOfState",
     "FENEBonds",
     "FieldForce",
+    "FluidDensity",
     "Gaussian",
     "Gravity",
     "GridField",

@@ -18,7 +18,7 @@ from .constraints import bodies_type, place_function, rounding_function
 from .contact import contact_types
 
 
-def _apart_function(precision: Precision) -> wp.Function:
+def apart_function(precision: Precision) -> wp.Function:
     """``apart(a, b, x_ij, r2, closest_squared)``: what a pair is apart by, and its square.
 
     Coincident particles, of slots a and b, are taken as 1 apart in one of eight directions by the
@@ -55,7 +55,7 @@ def _of_pairs(precision: Precision) -> tuple[wp.Function, wp.Function, wp.Functi
     def between(a: wp.array(dtype=vec3), i: int, j: int):
         return vector(a, i) - vector(a, j)
 
-    return _apart_function(precision), function(both), function(between)
+    return apart_function(precision), function(both), function(between)
 
 
 def crowding_term(precision: Precision, params: Any, bounce: bool) -> Term:
