@@ -22,7 +22,7 @@ from typing import Any
 
 import warp as wp
 
-from ...engine.easing import ease_function, easing_type
+from ...engine.easing import SMALLEST, ease_function, easing_type
 from ...engine.loops import Pairs, Term, reader
 from ...precision import Precision, function, register, structure
 from ..constraints import bodies_type, place_function, rounding_function
@@ -61,6 +61,8 @@ def density_types(precision: Precision) -> tuple[Any, Any]:
         "slack": wp.array(dtype=real),  # by particle
         "w": wp.array(dtype=real),
         "eased": real,
+        "pace": real,  # of what parts from an overlap of the start, a substep; and the same in h
+        "pace_in_h": real,
         "unit": real,
         "relaxation": real,
         "inverse_dt": real,
@@ -253,7 +255,8 @@ def store_multiplier(precision: Precision, params: Any) -> wp.Function:
     """Store: dlam_i = (C_i - alpha~ lam_i) / (D_i + alpha~), and lam_i >= 0.
 
     Where gradients are so small that more than a part of h would be gone, C counts as no more than
-    what gradients of that size take back on such a way.
+    what gradients of that size take back on such a way; and where a start has been forgiven more
+    than little, on the way of its own speed.
     """
     real, one = precision.scalar, precision.vector(1)
     Data, Sums = density_types(precision)
@@ -263,7 +266,9 @@ def store_multiplier(precision: Precision, params: Any) -> wp.Function:
         alpha = p.compliance * o.inverse_dt * o.unit * o.inverse_dt
         alpha = alpha * p.h * p.h
         lam = o.lam[particle]
-        most = real(FARTHEST) * o.steep[i]
+        pace = wp.min(o.pace * p.inverse_h + o.pace_in_h, real(FARTHEST))
+        forgiven = o.eased * o.slack[particle] * p.inverse_h > real(SMALLEST)
+        most = wp.where(forgiven, pace, real(FARTHEST)) * o.steep[i]
         missing = wp.min(o.error[i], most) - alpha * lam
         active = d.free[i] * D > real(0.0)
         grown = o.relaxation * missing / wp.where(active, D + alpha, real(1.0))

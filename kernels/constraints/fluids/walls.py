@@ -27,11 +27,11 @@ def wall_kernel(surface: Surface) -> wp.Kernel:
     vec3, real, pair2 = precision.vec3, precision.scalar, precision.vector(2)
     each, normals = precision.vector(sides), normals_of(precision, sides)
     Pose, Bodies, (Data, _) = pose_type(precision), bodies_type(precision), density_types(precision)
-    sight = sight_function(surface)
+    sight, end = sight_function(surface), real(float(NODES))
 
     def cut_off(t: real, table: wp.array(dtype=pair2)):
         """P and -dP/dt, by lines between nodes; behind a wall P(-t) = 1 - P(t)."""
-        at = wp.min(wp.abs(t), real(NODES))
+        at = wp.min(wp.abs(t), end)
         k = wp.min(int(at), NODES - 1)
         f = table[k] + (table[k + 1] - table[k]) * (at - real(k))
         return wp.where(t < real(0.0), real(1.0) - f[0], f[0]), f[1]

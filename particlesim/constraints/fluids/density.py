@@ -135,11 +135,8 @@ class FluidDensity(EasedConstraint):
         )
         self.beyond = Beyond(self, model)
         b = np.zeros(model.particle_count)
-        b[members] = (
-            self._volumes()
-            * self.smoothing.sigma
-            / self.h[model.world_of[members]] ** (self.dimension)
-        )
+        hd = self.h[model.world_of[members]] ** self.dimension
+        b[members] = self._volumes() * self.smoothing.sigma / hd
         model.fits(self.name, {"mass / (rest_density smoothing_length^d)": b})
         self.b = self.pairs.hold(model.array(b, model.precision.scalar))
         self.Params, self.params = model.parameters(
@@ -197,9 +194,8 @@ class FluidDensity(EasedConstraint):
         self.error, self.own, self.steep = (pairs.array(real) for _ in range(3))
         self.lam = wp.zeros(model.particle_count, dtype=real, device=model.device)
         self.Sums, self.w = Sums, state.inverse_mass
-        weight = self.smoothing.weight.function(precision)
-        slope = self.smoothing.slope.function(precision)
-        given = precision, self.Params
+        laws = self.smoothing.weight, self.smoothing.slope
+        (weight, slope), given = (law.function(precision) for law in laws), (precision, self.Params)
         self.crowd = self._kernel(
             kernels.crowding_term(weight, slope, *given),
             kernels.store_crowding(weight, self.walled, *given), Sums,
@@ -252,6 +248,8 @@ class FluidDensity(EasedConstraint):
         sums.share, sums.push = data.share, data.push
         sums.lam, sums.slack, sums.w = self.lam, self.easing.slack, self.w
         sums.relaxation, sums.eased = model.settings.relaxation, eased
+        sums.pace = self.easing.struct.speed * dt if moving else 0.0
+        sums.pace_in_h = self.easing.struct.radii_per_time * dt if moving else 0.0
         data.unit = sums.unit = model.mass_unit
         data.inverse_dt = sums.inverse_dt = inverse
         gather = kernels.gather_kernel(model.precision, self.compensated, self.walled)
