@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
+from cases.ready import small
 
 pytestmark = pytest.mark.slow
 G, RHO = 9.81, 1000.0
@@ -122,6 +123,21 @@ def test_a_rope_in_water_goes_by_its_mass(density, lowest, highest):
     assert lowest < height.min() and height.max() < highest
     length = np.linalg.norm(sim.position[links[:, 0]] - sim.position[links[:, 1]], axis=1)
     assert length == pytest.approx(s, rel=0.01)
+
+
+def test_a_splash_comes_to_rest_at_its_level():
+    """Within the compression that is left, of which the middle has about half, and less of it with
+    more sweeps.
+    """
+    module, scene = small("splash")
+    errors = []
+    for iterations in (4, 16):
+        settings = module.settings.replace(iterations=iterations)
+        sim = ps.Simulation(scene, settings, device="cpu")
+        sim.run(module.frames)
+        errors.append(module.error(sim))
+        assert errors[-1] < max(0.005, sim.diagnostics().constraint_error[0])
+    assert errors[1] < 0.5 * errors[0]
 
 
 def test_a_drop_in_free_fall_keeps_its_volume():
