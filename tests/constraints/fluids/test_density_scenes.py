@@ -44,21 +44,22 @@ def test_water_at_rest_keeps_its_height():
 
 
 def test_sweeps_take_compression_back():
-    """What is left falls with iterations, nearly as one over them, and with substeps."""
-    scene, _ = tank()
-    left = {}
-    for substeps, iterations in ((2, 2), (2, 8), (8, 2)):
-        settings = ps.Settings(dt=1 / 60, substeps=substeps, iterations=iterations)
-        sim = ps.Simulation(scene, settings, device="cpu")
-        sim.run(90)
-        left[substeps, iterations] = np.mean([_left(sim) for _ in range(6)])
-    assert left[2, 8] < 0.5 * left[2, 2]
-    assert left[8, 2] < left[2, 8]
+    """What is left falls with iterations, and faster with substeps; where it is much it is told."""
+    with pytest.warns(UserWarning, match="FluidDensity must hold within 10% of its rest density"):
+        least = left(2, 2)
+    assert left(2, 8) < 0.5 * least
+    assert left(8, 2) < left(2, 8)
 
 
-def _left(sim):
-    sim.run(5)
-    return sim.diagnostics().constraint_error[0]
+def left(substeps, iterations):
+    """The largest error of a tank at rest, on average over half a second."""
+    settings = ps.Settings(dt=1 / 60, substeps=substeps, iterations=iterations)
+    sim, found = ps.Simulation(tank()[0], settings, device="cpu"), []
+    sim.run(90)
+    for _ in range(6):
+        sim.run(5)
+        found.append(sim.diagnostics().constraint_error[0])
+    return np.mean(found)
 
 
 def dam(part):
