@@ -13,7 +13,7 @@ from .contact import MARGIN, excludes, touching_type
 TOUCH = 1e-4  # parts of the lesser radius: what still counts as touching, where contacts bounce
 
 
-def _apart_function(precision: Precision) -> wp.Function:
+def apart_function(precision: Precision) -> wp.Function:
     """``apart(a, b, x_ij, r2, closest_squared)``: what a pair is apart by, and its square.
 
     Coincident particles, of slots a and b, are taken as 1 apart in one of eight directions by the
@@ -61,7 +61,7 @@ def find_kernel(precision: Precision, periodic: Periodicity, params: Any) -> wp.
     """
     vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
     Touching, Bodies = touching_type(precision), bodies_type(precision)
-    apart, image = _apart_function(precision), minimum_image(precision, periodic)
+    apart, image = apart_function(precision), minimum_image(precision, periodic)
     meet = _meet_function(precision)
     near, exactly = real(MARGIN), real(TOUCH)
 

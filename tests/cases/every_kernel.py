@@ -212,6 +212,14 @@ def attracted(s, **attributes):
     return scene
 
 
+def dense(*walls, **options):
+    scene = particles(**options)
+    scene.add_constraint(ps.FluidDensity(rest_density=0.5, smoothing_length=1.0))
+    for wall in walls:
+        scene.add_constraint(wall)
+    return scene
+
+
 KEYS = ps.Keyframes([0.0, 1.0], [(0, 0, 0), (0, 0.1, 0)])
 BELT = ps.PlaneBoundary((0, -9, 0), (0, 1, 0), velocity=(1, 0, 0), slip=False)
 BOX, XSPH, VERLET = ((0, 0, 0), (10, 10, 10)), ps.XSPH(), {"integrator": "velocity_verlet"}
@@ -247,6 +255,8 @@ SCENES = {
     ),
     "clusters": (clustered, {"compensated": False}),
     "kinds": (lambda: kinds(), {}),
+    "density": (lambda: dense(BELT), {}),
+    "periodic_density": (lambda: dense(periodic=BOX), {"compensated": False}),
     "tree": (lambda: attracted(0.1), {"opening_angle": 0.5}),
     "own_softening": (lambda: attracted(None, softening=0.1), {"opening_angle": 0.5}),
     **{name: (lambda name=name: load_scene(name).build(), {}) for name in ready_scenes()},
@@ -254,5 +264,5 @@ SCENES = {
 
 EVERY_KERNEL = (
     "forces", "charged", "damped", "periodic_forces", "fluid", "constraints", "breaking",
-    "gas_dynamics", "star_collision", "tree", "continuity", "clusters",
+    "gas_dynamics", "star_collision", "tree", "continuity", "clusters", "density",
 )  # fmt: skip

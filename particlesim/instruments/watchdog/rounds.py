@@ -27,6 +27,7 @@ import warp as wp
 from ...constraints.boundaries.solid import SolidBoundary
 from ...constraints.constraint import Constraint
 from ...constraints.contact import Contact
+from ...constraints.fluids.density import FluidDensity
 from ...engine.loop import Loop
 from ..diagnostics import measure, undisturbed
 from ..residuals import UNMET, off, residuals
@@ -37,6 +38,7 @@ from .limits import GROWN, Limits
 DRIFT = 0.1  # of the largest kinetic energy
 DEEP = 0.2  # of a radius
 THROUGH = 1.0  # radii: who is so deep is on its way through
+DENSE = 0.1  # of the rest density
 FIRST = 8  # frames: what is ahead of a start is looked at as a run begins
 SHARE = 50  # times its own cost, from one round to the next
 ROUND = 6e6  # what a round costs beside three evaluations of the forces, in pairs of these
@@ -188,6 +190,9 @@ def _unmet(constraint: Any, loop: Loop) -> list[tuple[np.ndarray, np.ndarray, st
     if isinstance(constraint, Constraint):
         found = off(constraint, loop)
         return [] if found is None else [(*found, "its particles' distance", UNMET)]
+    if isinstance(constraint, FluidDensity) and constraint.count:
+        error, world = constraint.errors(forgiven=True)
+        return [(error, world, "its rest density", DENSE)]
     if not isinstance(constraint, Contact | SolidBoundary):
         return []
     missed = residuals(constraint, loop)
