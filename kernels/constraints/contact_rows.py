@@ -20,7 +20,8 @@ from .constraints import bodies_type, place_function, rounding_function
 from .contact import touching_type
 
 SETTLED = 1e-6  # parts of its way that a bounce may be short of
-ROUNDINGS = 8.0  # of the distance of a pair, besides
+CALM = 0.05  # and parts of the way up to which what forces push rests
+ROUNDINGS = 8.0  # and of the distance of a pair
 
 
 def largest_eigenvalue(precision: Precision) -> wp.Function:
@@ -151,6 +152,21 @@ def crowding_kernel(precision: Precision, params: Any) -> wp.Kernel:
     return count_contacts
 
 
+def _rubbed_function(precision: Precision) -> wp.Function:
+    """``rubbed(at, s, j, most, t)``: what friction of an entry takes back of the way in all."""
+    real, Touching = precision.scalar, touching_type(precision)
+
+    def rubbed(at: wp.int64, s: int, j: int, most: real, t: Touching):
+        u, n = t.way[s] - t.way[j], t.n[at]
+        rub = t.rub[at] - (u - n * wp.dot(u, n)) / (t.grip[s] + t.grip[j])
+        length = wp.length(rub)
+        if length > most:
+            rub = rub * (most / length)
+        return rub
+
+    return function(rubbed)
+
+
 @functools.cache
 def push_kernel(precision: Precision, params: Any, compensated: bool) -> wp.Kernel:
     """Kernel: multipliers of all pairs grow by what is missing, and particles move by w n dlam.
@@ -163,7 +179,7 @@ def push_kernel(precision: Precision, params: Any, compensated: bool) -> wp.Kern
     """
     vec3, real = precision.vec3, precision.scalar
     Bodies, Touching = bodies_type(precision), touching_type(precision)
-    stirred = _stirred_function(precision)
+    stirred, rubbed = _stirred_function(precision), _rubbed_function(precision)
     tiny = real(ROUNDINGS * float(np.finfo(precision.numpy).eps))
     kept, place = rounding_function(precision, compensated), place_function(precision, compensated)
 
@@ -174,10 +190,8 @@ def push_kernel(precision: Precision, params: Any, compensated: bool) -> wp.Kern
     ):  # fmt: skip
         s = first + wp.tid()
         i = pairs.order[s]
-        world = pairs.world[s]
+        world, count, begin = pairs.world[s], wp.min(t.found[i], t.room[i]), t.row[i]
         p = parameters[world]
-        count = wp.min(t.found[i], t.room[i])
-        begin = t.row[i]
         if count == 0 or t.running[world] == 0 or not stirred(s, begin, count, again, t):
             return
         share_i, stirs = t.share[s], real(0.0)
@@ -187,7 +201,7 @@ def push_kernel(precision: Precision, params: Any, compensated: bool) -> wp.Kern
             at = begin + wp.int64(k)
             lack, lam, j = t.lack[at], t.lam[at], t.partner[at]
             stir = wp.max(t.stir[s], t.stir[j])
-            if lam > real(0.0) and again != 0 and stir == real(0.0):
+            if again != 0 and stir == real(0.0):  # the other one may not look at it
                 virial += wp.float64(lam * wp.dot(t.n[at], t.x_ij[at]))
             elif lack > real(0.0) or lam > real(0.0):
                 n = t.n[at]
@@ -196,17 +210,14 @@ def push_kernel(precision: Precision, params: Any, compensated: bool) -> wp.Kern
                 more = wp.max(lam + change, real(0.0))
                 total += n * (more - lam)
                 if stir > real(0.0) and soft > real(0.0):
-                    fine = real(SETTLED) * stir + tiny * t.reach[at]
+                    fine = real(SETTLED) * stir + real(CALM) * (t.calm[s] + t.calm[j])
+                    fine += tiny * t.reach[at]
                     if wp.abs(lack - alpha * more) > fine:
                         stirs = stir
                         t.unsettled[world] = 1
                 t.lam[at] = more
                 if p.friction > real(0.0):
-                    u = t.way[s] - t.way[j]
-                    rub = t.rub[at] - (u - n * wp.dot(u, n)) / (t.grip[s] + t.grip[j])
-                    most, length = p.friction * more, wp.length(rub)
-                    if length > most:
-                        rub = rub * (most / length)
+                    rub = rubbed(at, s, j, p.friction * more, t)
                     total += rub - t.rub[at]
                     t.rub[at] = rub
                 virial += wp.float64(more * wp.dot(n, t.x_ij[at]))

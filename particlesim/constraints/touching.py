@@ -11,7 +11,7 @@ from ..engine.model import Model
 from ..engine.neighbors.lists import Rows
 from ..kernels.constraints.contact import touching_type
 
-FEW = 8  # entries of a row to begin with
+FEW = 12  # entries of a row to begin with: as many balls of one size touch another
 
 
 class Touching(Rows):
@@ -77,7 +77,10 @@ class Touching(Rows):
         if not self.overflow.numpy()[0]:
             return False
         most = self.struct.most.numpy()
-        self.room = np.where(most > self.room, most + FEW, self.room)
+        # Where one has become too short, those of its like will be; few large ones are not these.
+        self.room = np.maximum(
+            np.where(most > self.room, 2 * most, self.room), int(np.median(most))
+        )
         self._make_room()
         self.overflow.zero_()
         return True
