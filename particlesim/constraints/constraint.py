@@ -150,7 +150,8 @@ class Constraint(ReadTuples):
         Give it to ``add_interaction`` instead of adding the constraint.
 
         Raises:
-            ValueError: A compliance of 0, whose force would be infinite; a ``break_force``.
+            ValueError: A compliance of 0, whose force would be infinite; a ``break_force``; a
+                yield.
         """
         return ConstraintForce(self)
 

@@ -54,25 +54,33 @@ class Bending(Resting):
         damping: beta [energy time / rad^2], one or (m,), at least 0 (see :class:`Constraint`).
         break_force: Force on a particle beyond which a hinge no longer bends back [force], one or
             (m,), above 0; None: unbreakable.
+        yield_angle: How far one may be from its rest angle before that flows, as a wire that is
+            bent beyond its strength [rad], one or (m,), at least 0; None: any.
+        creep: How fast it flows, at least 0 [1 / time]: d theta_0/dt is that times what is beyond
+            the yield (Bingham 1922).
+        largest_angle: How far it flows from where it began, at least 0 [rad].
 
     Raises:
         ValueError: Wrong shapes, indices or values; a triangle without an area at the start, where
-            no rest angle is given.
+            no rest angle is given; a hinge that yields and is rigid.
 
     Example:
         >>> Bending([(0, 1, 2, 3)], rest_angle=0.0, compliance=1e-3).particles.tolist()
         [[0, 1, 2, 3]]
     """
 
+    yields_by = "angle"
     argument, size, rest, exists = "hinges", 4, "rest_angle", "two triangles with an area"
 
     def __init__(
         self, hinges: Any, rest_angle: Any = None, *, compliance: Any = 0.0, damping: Any = 0.0,
-        break_force: Any = None,
+        break_force: Any = None, yield_angle: Any = None, creep: float = 1.0,
+        largest_angle: float = math.pi,
     ):  # fmt: skip
         own = {"compliance": compliance, "damping": damping, "break_force": break_force}
         super().__init__(_fold, hinges, rest_angle, own)
         self._within(-math.pi * (1 + 1e-15), math.pi * (1 + 1e-15))
+        self._yields(yield_angle, creep, largest_angle)
 
     @staticmethod
     def quantity(x: np.ndarray) -> np.ndarray:
