@@ -47,7 +47,7 @@ class ConstraintForce(Interaction):
                 f"{constraint.name}.as_force", f"compliance[{int(np.argmin(alpha))}]",
                 "be above 0", float(alpha.min()), "its force would be infinite: use the constraint",
             )  # fmt: skip
-        if constraint.break_force is not None:
+        if constraint.breakable:
             raise validate.fail(
                 f"{constraint.name}.as_force", "break_force", "be None", constraint.break_force,
                 "only the constraint itself breaks",
