@@ -8,13 +8,12 @@ import warp as wp
 from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
 from ..precision import APART, Precision, function, register
 from .constraints import bodies_type
-from .contact import excludes, touching_type
+from .contact import MARGIN, excludes, touching_type
 
-MARGIN = 0.2  # parts of the lesser radius: as far as others push into contact what would not touch
-TOUCH = 1e-4  # and what still counts as touching, where contacts bounce
+TOUCH = 1e-4  # parts of the lesser radius: what still counts as touching, where contacts bounce
 
 
-def _apart_function(precision: Precision) -> wp.Function:
+def apart_function(precision: Precision) -> wp.Function:
     """``apart(a, b, x_ij, r2, closest_squared)``: what a pair is apart by, and its square.
 
     Coincident particles, of slots a and b, are taken as 1 apart in one of eight directions by the
@@ -62,7 +61,7 @@ def find_kernel(precision: Precision, periodic: Periodicity, params: Any) -> wp.
     """
     vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
     Touching, Bodies = touching_type(precision), bodies_type(precision)
-    apart, image = _apart_function(precision), minimum_image(precision, periodic)
+    apart, image = apart_function(precision), minimum_image(precision, periodic)
     meet = _meet_function(precision)
     near, exactly = real(MARGIN), real(TOUCH)
 
@@ -75,36 +74,42 @@ def find_kernel(precision: Precision, periodic: Periodicity, params: Any) -> wp.
         i, w = pairs.order[s], pairs.world[s]
         p, c = parameters[w], pairs.cluster[s]
         begin, room, found = t_out.row[i], t_out.room[i], int(0)
-        x_i, way_i, v_i, R_i = t_out.x[i], t_out.way[i], t_out.v[i], t_out.radius[i]
-        calm_i = t_out.calm[i]
+        x_i, span_i, stir = t_out.x[s], t_out.span[s], real(0.0)
         bounces = p.restitution > real(0.0) and dt > real(0.0)
         for k in range(pairs.count[c]):
             other = pairs.index[pairs.row[c] + wp.int64(k) * pairs.entry_stride]
+            x_ij = image(x_i - t_out.x[other], box[w])
+            span = span_i + t_out.span[other]
+            if other == s or wp.dot(x_ij, x_ij) > span * span:
+                continue
             j = pairs.order[other]
-            x_ij = image(x_i - t_out.x[j], box[w])
-            u = way_i - t_out.way[j]
-            reach = R_i + t_out.radius[j]
-            v = v_i - t_out.v[j]
-            calm = calm_i + t_out.calm[j]
+            u = t_out.way[s] - t_out.way[other]
+            R_i, R_j = t_out.radius[s], t_out.radius[other]
+            reach = R_i + R_j
+            v = t_out.v[s] - t_out.v[other]
+            calm = t_out.calm[s] + t_out.calm[other]
             rests = wp.dot(v, v) * dt * dt < calm * calm or not bounces
-            touch = reach + wp.min(R_i, t_out.radius[j]) * wp.where(rests, near, exactly)
-            near_by = j != i and meet(x_ij, u, touch) and b.w[i] + b.w[j] > real(0.0)
+            touch = reach + wp.min(R_i, R_j) * wp.where(rests, near, exactly)
+            near_by = meet(x_ij, u, touch) and b.w[i] + b.w[j] > real(0.0)
             if near_by and not excludes(apart_of, i, j):
                 if found < room:
                     at = begin + wp.int64(found)
                     d, d2 = apart(s, other, x_ij, wp.dot(x_ij, x_ij), p.closest_squared)
                     n = d / wp.sqrt(d2)
-                    t_out.partner[at] = j
+                    t_out.partner[at] = other
+                    t_out.reach[at] = reach
                     t_out.x_ij[at] = x_ij
                     t_out.n[at] = n
                     t_out.rise[at] = real(0.0)
                     if bounces and -wp.dot(n, v) * dt > calm:
                         t_out.rise[at] = -p.restitution * wp.dot(n, v) * dt
                         t_out.hit[w] = 1
+                        stir = wp.max(stir, -wp.dot(n, v) * dt)
                     t_out.lam[at] = real(0.0)
                     if p.friction > real(0.0):
                         t_out.rub[at] = vec3()
                 found += 1
+        t_out.stir[s] = stir
         t_out.found[i] = found
         t_out.most[i] = wp.max(t_out.most[i], found)
         t_out.virial[i] = wp.float64(0.0)

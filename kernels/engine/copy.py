@@ -48,7 +48,10 @@ def zero_kernel(dtype: Any, block: int = 1) -> wp.Kernel:
         if wp.static(block > 1):
             zero(i, wp.min(i + wp.static(block), target_out.shape[0]), target_out)
         else:
-            target_out[i] = dtype()
+            if wp.static(dtype in wp.types.scalar_types):
+                target_out[i] = dtype(0)
+            else:
+                target_out[i] = dtype()
 
     return zero_rows
 

@@ -11,7 +11,7 @@ from ..engine.model import Model
 from ..engine.neighbors.lists import Rows
 from ..kernels.constraints.contact import touching_type
 
-FEW = 4  # entries of a row to begin with
+FEW = 8  # entries of a row to begin with
 
 
 class Touching(Rows):
@@ -28,7 +28,15 @@ class Touching(Rows):
         self.struct = struct = touching_type(precision)()
         for name in ("way", "x", "v"):
             setattr(struct, name, self._zeros(count, precision.vec3))
-        for name in ("radius", "calm", "share", *(["grip"] if rough else [])):
+        for name in (
+            "radius",
+            "span",
+            "calm",
+            "stir",
+            "stirs",
+            "share",
+            *(["grip"] if rough else []),
+        ):
             setattr(struct, name, self._zeros(count, precision.scalar))
         struct.virial = self._zeros(count, wp.float64)
         for name in ("found", "most"):
@@ -55,7 +63,7 @@ class Touching(Rows):
         struct.partner = self._zeros(entries, wp.int32)
         for name in ("x_ij", "n", *(["rub"] if self.rough else [])):
             setattr(struct, name, self._zeros(entries, precision.vec3))
-        for name in ("rise", "lam"):
+        for name in ("rise", "reach", "lack", "lam"):
             setattr(struct, name, self._zeros(entries, precision.scalar))
         self.generation += 1
 

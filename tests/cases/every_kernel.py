@@ -200,9 +200,10 @@ def clustered():
     """A small cluster, and one of several chunks; all that they can do."""
     scene = particles()
     scene.add_constraint(
-        ps.ShapeMatching([range(8), range(6, 600)], 1.0, yield_strain=0.1, break_force=1.0)
+        ps.ShapeMatching([range(8), range(6, 600)], [0.0, 1.0], yield_strain=0.1, break_force=1.0)
     )
     scene.add_constraint(ps.Hinge(range(8), range(8, 16), (0, 0, 0), (0, 0, 1), break_force=1.0))
+    scene.add_constraint(ps.Attachment([0], [[(0, 0, 0)], [(0, 1, 0)]], times=[0.0, 1.0]))
     tetrahedron = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
     scene.add_constraint(ps.MeshVolume(tetrahedron, rest_volume=1.0, burst_pressure=1.0))
     return scene
@@ -211,6 +212,14 @@ def clustered():
 def attracted(s, **attributes):
     scene = particles(**attributes)
     scene.add_interaction(ps.Gravity(softening=s))
+    return scene
+
+
+def dense(*walls, **options):
+    scene = particles(**options)
+    scene.add_constraint(ps.FluidDensity(rest_density=0.5, smoothing_length=1.0))
+    for wall in walls:
+        scene.add_constraint(wall)
     return scene
 
 
@@ -242,9 +251,15 @@ SCENES = {
     "gas_dynamics": (lambda: heated(smoothing_length=ps.AdaptiveSmoothing()), VERLET),
     "constraints": (lambda: constrained(None, breaks=False, bounces=True), {"ledger": True}),
     "boundaries": (held, {}),
-    "breaking": (lambda: constrained(BOX, breaks=True, bounces=False), {"compensated": False}),
+    "breaking": (
+        lambda: constrained(BOX, breaks=True, bounces=False),
+        {"compensated": False, "solver": "jacobi", "acceleration": 0.5,
+         "constraint_tolerance": 1e-3, **VERLET},
+    ),
     "clusters": (clustered, {"compensated": False}),
     "kinds": (lambda: kinds(), {}),
+    "density": (lambda: dense(BELT), {}),
+    "periodic_density": (lambda: dense(periodic=BOX), {"compensated": False}),
     "tree": (lambda: attracted(0.1), {"opening_angle": 0.5}),
     "own_softening": (lambda: attracted(None, softening=0.1), {"opening_angle": 0.5}),
     **{name: (lambda name=name: load_scene(name).build(), {}) for name in ready_scenes()},
@@ -252,5 +267,5 @@ SCENES = {
 
 EVERY_KERNEL = (
     "forces", "charged", "damped", "periodic_forces", "fluid", "constraints", "breaking",
-    "gas_dynamics", "star_collision", "tree", "continuity", "clusters",
+    "gas_dynamics", "star_collision", "tree", "continuity", "clusters", "density",
 )  # fmt: skip

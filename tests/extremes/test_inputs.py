@@ -81,6 +81,7 @@ PARTS = {
                  "tolerance": 1e-5},
     ps.CylinderBoundary: {"start": (0, 0, 0), "end": (1, 0, 0), "radius": 0.2},
     ps.DFSPH: {"smoothing_length": 0.1, "rest_density": 1.0},
+    ps.FluidDensity: {"rest_density": 1.0, "smoothing_length": 0.1, "compliance": 1e-6},
     ps.HarmonicAngles: {"triples": [(0, 1, 2)], "stiffness": 1.0, "rest_angle": 2.0},
     ps.HarmonicBonds: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0},
     ps.HeightfieldBoundary: {

@@ -9,5 +9,6 @@ from cases.parts import KIN
 def pytest_collection_modifyitems(items):
     for item in items:
         given = item.callspec.params if hasattr(item, "callspec") else {}
-        if KIN.keys() & {given.get("name"), *given.get("pair", ())}:
+        names = [given.get("name"), *given.get("pair", ())]
+        if any(isinstance(name, str) and name in KIN for name in names):
             item.add_marker(pytest.mark.slow)

@@ -73,7 +73,7 @@ def find_kernel(precision: Precision) -> wp.Kernel:
             at = t.row[i] + wp.int64(k)
             more_out[at] = real(0.0)
             if t.rise[at] > real(0.0) and t.lam[at] > real(0.0):
-                j = t.partner[at]
+                j = pairs.order[t.partner[at]]
                 target = t.rise[at] * t.inverse_dt
                 light = (b.w[i] * many[i] + b.w[j] * many[j]) * b.unit
                 short = target - wp.dot(t.n[at], b.v[i] - b.v[j])
