@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -57,6 +58,9 @@ class ConstraintBase(Part):
     def wall(self, model: Any, state: Any) -> Any:
         """A :class:`~particlesim.scene.wall.Wall`, if it is solid; also before ``prepare``."""
         raise validate.undefined(self, "wall(self, model, state)")
+
+    def meet(self, constraints: Sequence[ConstraintBase]) -> None:
+        """Before ``prepare``: all constraints of the simulation, as they were added."""
 
     def begin(self, state: Any, neighbors: Any, dt: float) -> None:
         """At the start of a substep's projection."""

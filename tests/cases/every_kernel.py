@@ -158,8 +158,11 @@ def constrained(periodic, *, breaks, bounces):
     scene = particles(periodic=periodic)
     limit = {"break_force": 1.0} if breaks else {}
     triangle = ps.Constraint(flat, [(3, 4, 5)], area=1.0, inequality=True, **limit)
-    scene.add_constraint(ps.Distance([(0, 1), (1, 2)], 1.0, compliance=1e-6, damping=0.1, **limit))
+    wire = {"compliance": 1e-6, "damping": 0.1, "yield_strain": 0.1}
+    edges = scene.add_constraint(ps.Distance([(0, 1), (1, 2)], 1.0, **wire, **limit))
     scene.add_constraint(triangle)
+    if breaks:
+        scene.add_constraint(ps.Bending([(0, 1, 2, 3)], 0.1, edges=edges))
     if not breaks:
         scene.add_interaction(ps.Constraint(flat, [(6, 7, 8)], area=1.0, compliance=1e-3)
                               .as_force())  # fmt: skip

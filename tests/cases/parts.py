@@ -166,7 +166,7 @@ LEFT_OUT = {
     "density", "dimension", "viscosity", "pivot", "drawn", "mixing", "groups", "exclude", "switch",
     "method", "tolerance", "slip", "capped", "sheet", "motion", "rest", "yield_strain", "creep",
     "largest_strain", ("Electrostatics", "cutoff"), ("Electrostatics", "damping"), ("Gravity",
-    "cutoff"), "burst_pressure",
+    "cutoff"), "burst_pressure", "yield_angle", "largest_angle", "edges",
 }  # fmt: skip
 # What is of one machinery is tried by its kin in every run, and itself in the long one.
 KIN = {
