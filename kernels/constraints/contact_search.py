@@ -8,7 +8,7 @@ import warp as wp
 from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
 from ..precision import APART, Precision, function, register
 from .constraints import bodies_type
-from .contact import MARGIN, excludes, touching_type
+from .contact import MARGIN, entry_type, excludes, touching_type
 
 TOUCH = 1e-4  # parts of the lesser radius: what still counts as touching, where contacts bounce
 
@@ -76,10 +76,10 @@ def find_kernel(precision: Precision, periodic: Periodicity, params: Any) -> wp.
     is found as well. Of what moves and bounces it is these alone: what they push is met in the next
     substep, when the speed that it came with is known. Of what rests all that are near are found.
     """
-    vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
+    real, Box = precision.scalar, box_type(precision)
     Touching, Bodies = touching_type(precision), bodies_type(precision)
     apart, image = apart_function(precision), minimum_image(precision, periodic)
-    touches = _touches_function(precision)
+    touches, Entry = _touches_function(precision), entry_type(precision)
 
     @register
     def find_contacts(
@@ -108,18 +108,16 @@ def find_kernel(precision: Precision, periodic: Periodicity, params: Any) -> wp.
                     at = begin + wp.int64(found)
                     d, d2 = apart(s, other, x_ij, wp.dot(x_ij, x_ij), p.closest_squared)
                     n = d / wp.sqrt(d2)
-                    t_out.partner[at] = other
-                    t_out.reach[at] = t_out.radius[s] + t_out.radius[other]
-                    t_out.x_ij[at] = x_ij
-                    t_out.n[at] = n
-                    t_out.rise[at] = real(0.0)
+                    e = Entry()
+                    e.partner = other
+                    e.reach = t_out.radius[s] + t_out.radius[other]
+                    e.x_ij = x_ij
+                    e.n = n
                     if bounces and -wp.dot(n, v) * dt > calm:
-                        t_out.rise[at] = -p.restitution * wp.dot(n, v) * dt
+                        e.rise = -p.restitution * wp.dot(n, v) * dt
                         t_out.hit[w] = 1
                         stir = wp.max(stir, -wp.dot(n, v) * dt)
-                    t_out.lam[at] = real(0.0)
-                    if p.friction > real(0.0):
-                        t_out.rub[at] = vec3()
+                    t_out.entry[at] = e
                 found += 1
         t_out.stir[s] = stir
         t_out.found[i] = found
