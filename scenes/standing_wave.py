@@ -2,7 +2,7 @@
 
 A plane of water 1 deep and half a wave wide. Linear theory: omega^2 = g k tanh(k H), and the flow
 is that of a potential cos(k x) cosh(k (y + H)) below the surface y = 0. It starts level and in
-motion, with masses as dense as the weight above makes them.
+motion, under the pressure of the weight above.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 import particlesim as ps
 
 GRAVITY, DEPTH = 9.81, 1.0
-DENSITY, SOUND = 1000.0, 45.0  # at rest [kg/m^3], [m/s]
+DENSITY, SPEED = 1000.0, 4.5  # at rest [kg/m^3], of a fall over the depth [m/s]
 
 frames = 60
 settings = ps.Settings(dt=0.02, substeps=75)
@@ -29,24 +29,20 @@ def build(
         density: By continuity; None: summed.
     """
     scene = ps.Scene()
-    x = ps.sample.box((0, -DEPTH, 0), (length / 2, 0, 0), spacing)
-    pressure = DENSITY * GRAVITY * -x[:, 1]
-    rho = DENSITY * (1 + 7 * pressure / (DENSITY * SOUND**2)) ** (1 / 7)  # by Tait
-    start = {} if density is None else {"start_density": rho}
-    scene.add_particles(
-        x, velocity=speed * flow(x, length), mass=rho * spacing**2, radius=0.5 * spacing,
-        group="water", **start,
-    )  # fmt: skip
     scene.add_interaction(ps.UniformGravity((0, -GRAVITY, 0)))
-    scene.add_interaction(
-        ps.SPH(
-            smoothing_length=2 * spacing,
-            rest_density=DENSITY,
-            equation_of_state=ps.Tait(SOUND),
-            viscosity=ps.ArtificialViscosity(0.01),
-            density=density,
-            dimension=2,
-        )
+    x = ps.sample.box((0, -DEPTH, 0), (length / 2, 0, 0), spacing)
+    scene.add_fluid(
+        x,
+        spacing=spacing,
+        rest_density=DENSITY,
+        speed=SPEED,
+        hydrostatic=True,
+        velocity=speed * flow(x, length),
+        smoothing_length=2 * spacing,
+        viscosity=ps.ArtificialViscosity(0.01),
+        density=density,
+        dimension=2,
+        group="water",
     )
     sides = (0, -DEPTH, -np.inf), (length / 2, DEPTH, np.inf)
     scene.add_constraint(ps.BoxBoundary(*sides))

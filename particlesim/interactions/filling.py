@@ -10,6 +10,7 @@ import numpy as np
 from .. import validate
 from ..scene import sample
 from ..scene.scene import Scene
+from .fluid.density.continuity import START, ContinuityDensity
 from .fluid.equations_of_state import Tait
 from .fluid.smoothing import SmoothingFunction
 from .fluid.sph import SPH
@@ -25,7 +26,8 @@ def fill(
     scene: Scene, shape: Any, spacing: float, rest_density: float, speed: float | None,
     hydrostatic: bool, velocity: Any, smoothing_length: float | None,
     smoothing: str | SmoothingFunction, viscosity: Viscosity | Sequence[Viscosity] | None,
-    dimension: int, group: str | None, color: Sequence[float] | None,
+    density: ContinuityDensity | None, dimension: int, group: str | None,
+    color: Sequence[float] | None,
 ) -> SPH:  # fmt: skip
     """See :meth:`particlesim.Scene.add_fluid`."""
     s = validate.number(OWNER, "spacing", spacing, above=0.0, unit="length")
@@ -49,20 +51,23 @@ def fill(
     options: dict[str, Any] = {
         "smoothing_length": REACH * s if smoothing_length is None else smoothing_length,
         "rest_density": rho_0, "equation_of_state": law, "smoothing": smoothing,
-        "viscosity": viscosity, "dimension": dimension,
+        "viscosity": viscosity, "density": density, "dimension": dimension,
     }  # fmt: skip
     SPH(**options)
-    mass = np.full(len(x), rho_0 * s**dimension)
+    rho, start = np.full(len(x), rho_0), dict[str, np.ndarray]()
     if hydrostatic:
         if pull == 0.0:
             raise validate.fail(
                 OWNER, "hydrostatic", "be False in a scene without gravity", hydrostatic,
                 "add a UniformGravity before the fluid",
             )  # fmt: skip
-        mass *= compression(law, pull * depth)
+        rho *= compression(law, pull * depth)
+        if density is not None:
+            start[START] = rho
     particles = scene.add_particles(
-        x, velocity=velocity, mass=mass, radius=0.5 * s, group=group, color=color
-    )
+        x, velocity=velocity, mass=rho * s**dimension, radius=0.5 * s, group=group, color=color,
+        **start,
+    )  # fmt: skip
     fluid = SPH(particles, **options)
     scene.add_interaction(fluid)
     return fluid

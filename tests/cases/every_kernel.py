@@ -236,7 +236,7 @@ SCENES = {
     "small_periodic_world": (lambda: few_forces(BOX, 20), {}),
     "fluid": (
         lambda: fluid(
-            None, [BELT], smoothing=Bell(),
+            None, [BELT], smoothing=Bell(), equation_of_state=ps.IdealGas(1.4),
             viscosity=[ps.ArtificialViscosity(0.1, balsara=True), ps.LaminarViscosity(0.1), XSPH],
         ),
         {"most_substeps": 64},

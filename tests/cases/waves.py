@@ -10,9 +10,10 @@ def fitted(length, spacing, density=None):
     """Period over the exact one, and damping [1/s], of the oscillation that fits three best."""
     exact = standing_wave.period(length)
     dt = exact / 40
-    substeps = int(np.ceil(dt / (0.35 * 2 * spacing / standing_wave.SOUND)))
-    settings = standing_wave.settings.replace(dt=dt, substeps=substeps)
     scene = standing_wave.build(length, spacing, density=density)
+    sound = scene.interactions[1].parameters["state_sound_speed"]
+    substeps = int(np.ceil(dt / (0.35 * 2 * spacing / sound)))
+    settings = standing_wave.settings.replace(dt=dt, substeps=substeps)
     sim = ps.Simulation(scene, settings, device="cpu")
     signal = [standing_wave.amplitude(sim)]
     for _ in range(120):

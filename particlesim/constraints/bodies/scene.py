@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...interactions.filling import VISCOSITY, fill
+from ...interactions.fluid.density.continuity import ContinuityDensity
 from ...interactions.fluid.smoothing import SmoothingFunction
 from ...interactions.fluid.sph import SPH
 from ...interactions.fluid.viscosities import Viscosity
@@ -36,6 +37,7 @@ class Scene(scene.Scene):
         smoothing_length: float | None = None,
         smoothing: str | SmoothingFunction = "wendland_c2",
         viscosity: Viscosity | Sequence[Viscosity] | None = VISCOSITY,
+        density: ContinuityDensity | None = None,
         dimension: int = 3,
         group: str | None = None,
         color: Sequence[float] | None = None,
@@ -51,16 +53,15 @@ class Scene(scene.Scene):
                 ``sample.sphere``; or two corners of a box, (2, 3), which is filled.
             spacing: s, distance of neighbouring particles [length].
             rest_density: rho0 [mass/length^d].
-            speed: The largest that is expected [length/time]. None: sqrt(2 g H), that of a fall
-                from the surface to the bottom of the shape, by the gravity that the scene has
-                by then; what falls farther, or is thrown, is faster.
-            hydrostatic: Start under the pressure of the weight above, up to the level of the
-                highest particle: masses are those of the density at their depth, by which the body
-                weighs g H / (2 c^2), or a quarter of a percent, more.
+            speed: The largest that is expected [length/time]. None: that of a fall from the surface
+                to the bottom, sqrt(2 g H) by the gravity of by then; what is thrown is faster.
+            hydrostatic: Start under the pressure of the weight above, up to the highest particle:
+                masses are of the density there; all weigh g H / (2 c^2), a quarter of 1 %, more.
             velocity: (3,) for all, or (n, 3) [length/time].
             smoothing_length: h [length]. None: 1.3 spacings.
             smoothing: As of :class:`SPH`.
             viscosity: As of :class:`SPH`.
+            density: As of :class:`SPH`; by continuity a hydrostatic start has its densities too.
             dimension: d, as of :class:`SPH`; a flat box has one layer.
             group: As of ``add_particles``.
             color: As of ``add_particles``.
@@ -82,5 +83,5 @@ class Scene(scene.Scene):
         """
         return fill(
             self, shape, spacing, rest_density, speed, hydrostatic, velocity, smoothing_length,
-            smoothing, viscosity, dimension, group, color,
+            smoothing, viscosity, density, dimension, group, color,
         )  # fmt: skip
