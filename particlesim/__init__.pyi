@@ -24,6 +24,7 @@ from .constraints.clusters.shape_matching import ShapeMatching
 from .constraints.constraint import Constraint
 from .constraints.contact import Contact
 from .constraints.distance import Distance
+from .constraints.fluids.density import FluidDensity
 from .constraints.force import ConstraintForce
 from .constraints.gradient import check_gradient
 from .constraints.kinds.angle import Angle
@@ -145,6 +146,7 @@ __all__ = [
     "EquationOfState",
     "FENEBonds",
     "FieldForce",
+    "FluidDensity",
     "Gaussian",
     "Gravity",
     "GridField",

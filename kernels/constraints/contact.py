@@ -10,7 +10,25 @@ from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
 from ..precision import Precision, function, register, structure
 from .constraints import bodies_type
 
+MARGIN = 0.2  # parts of the lesser radius: as far as others push into contact what would not touch
 REST = 2.0  # times the speed that forces add in a substep: who comes slower does not bounce
+
+
+@functools.cache
+def entry_type(precision: Precision) -> Any:
+    """A pair as the row of one of its two has it, close together in memory."""
+    vec3, real = precision.vec3, precision.scalar
+    fields = {
+        "x_ij": vec3,  # of the pair where the substep began
+        "n": vec3,  # and its direction
+        "rub": vec3,  # multiplier times direction of friction
+        "reach": real,  # the distance that they keep
+        "rise": real,  # how much farther apart a bounce takes the pair
+        "lack": real,  # how much they are short of it as a sweep begins
+        "lam": real,
+        "partner": wp.int32,  # the slot of the other one
+    }
+    return structure(f"Touch_{precision.name}", fields)
 
 
 @functools.cache
@@ -22,13 +40,19 @@ def touching_type(precision: Precision) -> Any:
     """
     vec3, real = precision.vec3, precision.scalar
     fields = {
+        # By slot, as pairs find each other.
         "radius": wp.array(dtype=real),  # less the slack
+        "span": wp.array(dtype=real),  # no two touch that are farther apart than both of theirs
         "way": wp.array(dtype=vec3),  # of this substep, as far as it has come
         "x": wp.array(dtype=vec3),  # where the substep began, as pairs see it
         "v": wp.array(dtype=vec3),  # with which it began, before its forces
         "calm": wp.array(dtype=real),  # the way of a substep up to which it rests
+        # The way of a bounce that it has part in and that is not settled, now and then.
+        "stir": wp.array(dtype=real),
+        "stirs": wp.array(dtype=real),
         "share": wp.array(dtype=real),  # w unit times the ways that normals are split
         "grip": wp.array(dtype=real),  # w unit times the ways that friction is split
+        # By particle.
         "virial": wp.array(dtype=wp.float64),  # of each particle in this substep, twice its share
         "row": wp.array(dtype=wp.int64),  # where its row begins
         "room": wp.array(dtype=wp.int32),  # entries of it that there is room for
@@ -39,13 +63,7 @@ def touching_type(precision: Precision) -> Any:
         "hit": wp.array(dtype=wp.int32),  # something bounces in this substep
         "running": wp.array(dtype=wp.int32),  # to be swept again
         "unsettled": wp.array(dtype=wp.int32),  # some pair is still short of its distance
-        # The rows.
-        "partner": wp.array(dtype=wp.int32),
-        "x_ij": wp.array(dtype=vec3),  # of the pair where the substep began
-        "n": wp.array(dtype=vec3),  # and its direction
-        "rise": wp.array(dtype=real),  # how much farther apart a bounce takes the pair
-        "lam": wp.array(dtype=real),
-        "rub": wp.array(dtype=vec3),  # multiplier times direction of friction
+        "entry": wp.array(dtype=entry_type(precision)),  # the rows
         "unit": real,  # of mass, as of the bodies
         "relaxation": real,
         "inverse_dt": real,  # 0 in a static projection
@@ -160,27 +178,35 @@ def start_kernel(precision: Precision, compensated: bool, forces: bool) -> wp.Ke
         i = pairs.order[s]
         v = b.v[i]
         way = v * dt + b.correction[i] * follow
-        t_out.way[i] = way
-        t_out.x[i] = seen(s, i, pairs, b) - way
-        t_out.radius[i] = radius[i] - eased * slack[i]
+        R = radius[i] - eased * slack[i]
+        t_out.way[s] = way
+        t_out.x[s] = seen(s, i, pairs, b) - way
+        t_out.radius[s] = R
+        t_out.span[s] = R * real(1.0 + MARGIN) + wp.length(way)
         if wp.static(forces):
             v = v - f[i] * (b.w[i] * dt)
-        t_out.v[i] = v
-        t_out.calm[i] = real(REST) * wp.length(way - v * dt)
+        t_out.v[s] = v
+        t_out.calm[s] = real(REST) * wp.length(way - v * dt)
 
     return start_contacts
 
 
 @functools.cache
 def way_kernel(precision: Precision) -> wp.Kernel:
-    """Kernel: how far each particle has come in this substep."""
+    """Kernel: how far each particle has come in this substep, and whether it is swept ``again``."""
     real = precision.scalar
     Bodies, Touching = bodies_type(precision), touching_type(precision)
 
     @register
-    def take_ways(first: int, pairs: Pairs, b: Bodies, dt: real, follow: real, t_out: Touching):
-        i = pairs.order[first + wp.tid()]
-        t_out.way[i] = b.v[i] * dt + b.correction[i] * follow
+    def take_ways(
+        first: int, pairs: Pairs, b: Bodies, dt: real, follow: real, again: int, t_out: Touching
+    ):
+        s = first + wp.tid()
+        i = pairs.order[s]
+        if again != 0:
+            t_out.stir[s] = t_out.stirs[s]
+        t_out.stirs[s] = real(0.0)
+        t_out.way[s] = b.v[i] * dt + b.correction[i] * follow
 
     return take_ways
 

@@ -17,10 +17,11 @@ import warp as wp
 from ..engine.loops import Pairs
 from ..precision import Precision, function, register
 from .constraints import bodies_type, place_function, rounding_function
-from .contact import touching_type
+from .contact import entry_type, touching_type
 
 SETTLED = 1e-6  # parts of its way that a bounce may be short of
-ROUNDINGS = 8.0  # of the distance of a pair, besides
+CALM = 0.05  # and parts of the way up to which what forces push rests
+ROUNDINGS = 8.0  # and of the distance of a pair
 
 
 def largest_eigenvalue(precision: Precision) -> wp.Function:
@@ -54,26 +55,47 @@ def largest_eigenvalue(precision: Precision) -> wp.Function:
 
 @functools.cache
 def _missing_function(precision: Precision) -> wp.Function:
-    """``missing(at, way_i, R_i, t) -> (lack, u)``: how far an entry's pair is short of its
-    distance, and its way in this substep.
+    """``missing(e, u)``: how far an entry's pair is short of its distance on its way u.
 
-    A bounce sends it off along the direction of the start, by e times the way it came.
+    A bounce sends it off along the direction of the start, by e times the way it came. What keeps
+    its distance, and has not pushed, is short of nothing: -1.
     """
-    vec3, real, Touching = precision.vec3, precision.scalar, touching_type(precision)
+    vec3, real, Entry = precision.vec3, precision.scalar, entry_type(precision)
 
-    def missing(at: wp.int64, way_i: vec3, R_i: real, t: Touching):
-        j, n, x_ij = t.partner[at], t.n[at], t.x_ij[at]
-        u = way_i - t.way[j]
-        reach, rise = R_i + t.radius[j], t.rise[at]
-        y = x_ij + u
-        r, along = wp.length(y), wp.dot(n, y)
-        # Past the middle the distance is no measure.
-        lack = reach - wp.where(along < real(0.5) * r, along, r)
-        if rise > real(0.0):
-            lack = wp.max(reach - wp.dot(n, x_ij), rise) - wp.dot(n, u)
-        return lack, u
+    def missing(e: Entry, u: vec3):
+        reach, y = e.reach, e.x_ij + u
+        along = wp.dot(e.n, y)
+        r2 = wp.dot(y, y)
+        lack = real(-1.0)
+        if r2 < reach * reach or along < real(0.0) or e.rise > real(0.0) or e.lam > real(0.0):
+            r = wp.sqrt(r2)
+            # Past the middle the distance is no measure.
+            lack = reach - wp.where(along < real(0.5) * r, along, r)
+            if e.rise > real(0.0):
+                lack = wp.max(reach - wp.dot(e.n, e.x_ij), e.rise) - wp.dot(e.n, u)
+        return lack
 
     return function(missing)
+
+
+@functools.cache
+def _stirred_function(precision: Precision) -> wp.Function:
+    """``stirred(s, row, count, again, t)``: whether the particle of slot s has part in a sweep.
+
+    All have in those of an iteration; ``again`` those alone that a bounce stirs, and who touches
+    them.
+    """
+    real, Touching = precision.scalar, touching_type(precision)
+
+    def stirred(s: int, row: wp.int64, count: int, again: int, t: Touching):
+        if again == 0 or t.stir[s] > real(0.0):
+            return True
+        for k in range(count):
+            if t.stir[t.entry[row + wp.int64(k)].partner] > real(0.0):
+                return True
+        return False
+
+    return function(stirred)
 
 
 @functools.cache
@@ -89,24 +111,29 @@ def crowding_kernel(precision: Precision, params: Any) -> wp.Kernel:
     real, six = precision.scalar, precision.vector(6)
     Bodies, Touching = bodies_type(precision), touching_type(precision)
     eigenvalue, missing = largest_eigenvalue(precision), _missing_function(precision)
+    stirred = _stirred_function(precision)
 
     @register
     def count_contacts(
-        first: int, pairs: Pairs, parameters: wp.array(dtype=params), b: Bodies, t: Touching,
+        first: int, pairs: Pairs, parameters: wp.array(dtype=params), b: Bodies, again: int,
+        t: Touching,
     ):  # fmt: skip
         s = first + wp.tid()
         i = pairs.order[s]
         world = pairs.world[s]
         p = parameters[world]
         count = wp.min(t.found[i], t.room[i])
-        if count == 0 or t.running[world] == 0:
+        begin = t.row[i]
+        if count == 0 or t.running[world] == 0 or not stirred(s, begin, count, again, t):
             return
-        way_i, R_i, total = t.way[i], t.radius[i], six()
+        way_i, total = t.way[s], six()
         for k in range(count):
-            at = t.row[i] + wp.int64(k)
-            lack, _u = missing(at, way_i, R_i, t)
-            if lack > real(0.0) or t.lam[at] > real(0.0):
-                m = t.n[at]
+            at = begin + wp.int64(k)
+            e = t.entry[at]
+            e.lack = missing(e, way_i - t.way[e.partner])
+            t.entry[at] = e
+            if e.lack > real(0.0) or e.lam > real(0.0):
+                m = e.n
                 total += six(
                     m[0] * m[0], m[0] * m[1], m[0] * m[2], m[1] * m[1], m[1] * m[2], m[2] * m[2]
                 )
@@ -118,10 +145,25 @@ def crowding_kernel(precision: Precision, params: Any) -> wp.Kernel:
             a = real(1.0) - crowding / wp.max(n, real(1.0))
             ease = real(0.75) * a
             split = crowding / (real(1.0) - a + a * ease)
-            t.grip[i] = w * n / (real(1.0) - ease)
-        t.share[i] = w * split
+            t.grip[s] = w * n / (real(1.0) - ease)
+        t.share[s] = w * split
 
     return count_contacts
+
+
+def _rubbed_function(precision: Precision) -> wp.Function:
+    """``rubbed(e, s, most, t)``: what friction of an entry takes back of the way in all."""
+    real, Touching, Entry = precision.scalar, touching_type(precision), entry_type(precision)
+
+    def rubbed(e: Entry, s: int, most: real, t: Touching):
+        u, n = t.way[s] - t.way[e.partner], e.n
+        rub = e.rub - (u - n * wp.dot(u, n)) / (t.grip[s] + t.grip[e.partner])
+        length = wp.length(rub)
+        if length > most:
+            rub = rub * (most / length)
+        return rub
+
+    return function(rubbed)
 
 
 @functools.cache
@@ -136,46 +178,49 @@ def push_kernel(precision: Precision, params: Any, compensated: bool) -> wp.Kern
     """
     vec3, real = precision.vec3, precision.scalar
     Bodies, Touching = bodies_type(precision), touching_type(precision)
-    missing = _missing_function(precision)
+    stirred, rubbed = _stirred_function(precision), _rubbed_function(precision)
     tiny = real(ROUNDINGS * float(np.finfo(precision.numpy).eps))
     kept, place = rounding_function(precision, compensated), place_function(precision, compensated)
 
     @register
     def push_contacts(
-        first: int, pairs: Pairs, parameters: wp.array(dtype=params), dt: real, t: Touching,
+        first: int, pairs: Pairs, parameters: wp.array(dtype=params), again: int, t: Touching,
         b: Bodies,
     ):  # fmt: skip
         s = first + wp.tid()
         i = pairs.order[s]
-        world = pairs.world[s]
+        world, count, begin = pairs.world[s], wp.min(t.found[i], t.room[i]), t.row[i]
         p = parameters[world]
-        count = wp.min(t.found[i], t.room[i])
-        if count == 0 or t.running[world] == 0:
+        if count == 0 or t.running[world] == 0 or not stirred(s, begin, count, again, t):
             return
-        way_i, R_i, share_i = t.way[i], t.radius[i], t.share[i]
+        share_i, stirs = t.share[s], real(0.0)
         alpha = p.compliance * t.inverse_dt * t.unit * t.inverse_dt
         total, w, virial = vec3(), b.w[i] * t.unit, wp.float64(0.0)
         for k in range(count):
-            at = t.row[i] + wp.int64(k)
-            lack, u = missing(at, way_i, R_i, t)
-            n, lam, j = t.n[at], t.lam[at], t.partner[at]
-            if lack > real(0.0) or lam > real(0.0):
-                change = (lack - alpha * lam) / (share_i + t.share[j] + alpha)
-                more = wp.max(lam + change, real(0.0))
-                total += n * (more - lam)
-                way = wp.max(wp.length(t.v[i]), wp.length(t.v[j])) * dt
-                fine = real(SETTLED) * way + tiny * (R_i + t.radius[j])
-                if wp.abs(lack - alpha * more) > fine and share_i + t.share[j] > real(0.0):
-                    t.unsettled[world] = 1
-                t.lam[at] = more
+            at = begin + wp.int64(k)
+            e = t.entry[at]
+            j, stir = e.partner, wp.max(t.stir[s], t.stir[e.partner])
+            if again != 0 and stir == real(0.0):  # the other one may not look at it
+                virial += wp.float64(e.lam * wp.dot(e.n, e.x_ij))
+            elif e.lack > real(0.0) or e.lam > real(0.0):
+                soft = share_i + t.share[j]
+                change = (e.lack - alpha * e.lam) / (soft + alpha)
+                more = wp.max(e.lam + change, real(0.0))
+                total += e.n * (more - e.lam)
+                if stir > real(0.0) and soft > real(0.0):
+                    fine = real(SETTLED) * stir + real(CALM) * (t.calm[s] + t.calm[j])
+                    fine += tiny * e.reach
+                    if wp.abs(e.lack - alpha * more) > fine:
+                        stirs = stir
+                        t.unsettled[world] = 1
                 if p.friction > real(0.0):
-                    rub = t.rub[at] - (u - n * wp.dot(u, n)) / (t.grip[i] + t.grip[j])
-                    most, length = p.friction * more, wp.length(rub)
-                    if length > most:
-                        rub = rub * (most / length)
-                    total += rub - t.rub[at]
-                    t.rub[at] = rub
-                virial += wp.float64(more * wp.dot(n, t.x_ij[at]))
+                    rub = rubbed(e, s, p.friction * more, t)
+                    total += rub - e.rub
+                    e.rub = rub
+                e.lam = more
+                t.entry[at] = e
+                virial += wp.float64(more * wp.dot(e.n, e.x_ij))
+        t.stirs[s] = stirs
         rate = wp.float64(t.inverse_dt)
         t.virial[i] = virial * rate * rate * wp.float64(t.unit)
         if w > real(0.0):

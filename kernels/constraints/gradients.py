@@ -1,5 +1,6 @@
 """Constraints and their gradients at given positions, for checks."""
 
+import functools
 from typing import Any
 
 import warp as wp
@@ -19,7 +20,7 @@ def gradient_kernel(evaluate: wp.Function, precision: Precision, size: int, item
     # Emitted behind the evaluation, which may itself stand behind the adjoints that it calls.
     at = function(evaluated, after_gradients=True)
 
-    @register
+    @functools.partial(register, cpu_only=True)  # asked for by hand
     def constraint_gradients(
         first: int,
         place: wp.array(dtype=Positions),

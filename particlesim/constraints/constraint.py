@@ -137,7 +137,7 @@ class Constraint(ReadTuples):
     def kind(self) -> tuple[Any, ...]:
         return (
             type(self), self.law.key, self.particles.shape[1], self.inequality,
-            self.break_force is None, tuple(self.parameters),
+            self.breakable, tuple(self.parameters),
         )  # fmt: skip
 
     def links(self) -> np.ndarray:
@@ -150,7 +150,8 @@ class Constraint(ReadTuples):
         Give it to ``add_interaction`` instead of adding the constraint.
 
         Raises:
-            ValueError: A compliance of 0, whose force would be infinite; a ``break_force``.
+            ValueError: A compliance of 0, whose force would be infinite; a ``break_force``; a
+                yield.
         """
         return ConstraintForce(self)
 
@@ -262,8 +263,7 @@ class Constraint(ReadTuples):
         return self.tuples.complaint(self.name)
 
     def persistent(self) -> dict[str, wp.array]:
-        breakable = self.count and self.break_force is not None
-        return {"broken": self.struct.broken} if breakable else {}
+        return {"broken": self.struct.broken} if self.count and self.breakable else {}
 
     def readable(self) -> dict[str, wp.array]:
         return {"lam": self.struct.lam, "scale": self.struct.scale} if self.count else {}

@@ -23,11 +23,11 @@ from ..kernels.constraints import contact_rows as rows
 from ..kernels.constraints.contact_search import find_kernel
 from .easing import EasedConstraint
 from .limits import contact_limits
+from .solving.contact_bounce import ContactBounce
 from .touching import Touching
 from .tuples import bodies
 
 CLOSEST = 1e-9  # parts of the cutoff: closer than this, particles count as coincident
-SWEEPS = 200  # of contacts that bounce, in each iteration, at most
 
 
 class Contact(EasedConstraint):
@@ -158,10 +158,14 @@ class Contact(EasedConstraint):
         self.touching = Touching(model, rough=bool(columns["friction"].any()))
         self.neighbors.kept.append(self.touching)
         self.bouncing = bool(columns["restitution"].any())
+        self.fresh = False  # whether bounces are yet to be settled in this substep
         self.start_kernel = kernels.start_kernel(precision, compensated, forced)
         self.find_kernel = find_kernel(precision, model.periodic, Params)
         self.count_kernel = rows.crowding_kernel(precision, Params)
         self.push_kernel = rows.push_kernel(precision, Params, compensated)
+        # Particles by themselves have bounced off when they are projected.
+        bodies_here = any(each.rank == 0 for each in model.scenes[0].constraints)
+        self.through_bodies = ContactBounce(self) if self.bouncing and bodies_here else None
 
     def _excluded(self, w: int) -> np.ndarray:
         """Pairs of world w that do not touch each other."""
@@ -187,6 +191,7 @@ class Contact(EasedConstraint):
             self._launch(measure, inputs)
             call(self.easing.unmark)
         self._launch(run_out, [self.radius, self.easing.struct, dt, slack])
+        self.fresh = True
         self._find(dt, 1.0)
 
     def _find(self, dt: float, moving: float) -> None:
@@ -207,27 +212,41 @@ class Contact(EasedConstraint):
         moving = not math.isinf(dt)
         if not moving:
             self._find(0.0, 0.0)
-        self._sweep(dt, moving)
-        if self.bouncing and moving:
+        self._sweep(dt, moving, again=False)
+        if self.bouncing and self.fresh:  # once a substep: what follows finds it settled
+            self.fresh = False
             self._decide()
             with repeat(self.touching.flag):
-                self._sweep(dt, moving)
+                self._sweep(dt, moving, again=True)
                 self._decide()
             call(self.touching.run)
 
-    def _sweep(self, dt: float, moving: bool) -> None:
+    def _sweep(self, dt: float, moving: bool, again: bool) -> None:
         touching, own = self.touching.struct, dt if moving else 0.0
         take = kernels.way_kernel(self.model.precision)
-        self._launch(take, [self.bodies, own, float(moving), touching])
-        self._launch(self.count_kernel, [self.params, self.bodies, touching])
-        self._launch(self.push_kernel, [self.params, own, touching, self.bodies])
+        self._launch(take, [self.bodies, own, float(moving), int(again), touching])
+        self._launch(self.count_kernel, [self.params, self.bodies, int(again), touching])
+        self._launch(self.push_kernel, [self.params, int(again), touching, self.bodies])
 
     def _decide(self) -> None:
         """Which worlds are swept again."""
         model, touching = self.model, self.touching
         call(touching.flag.zero_)
-        inputs = [SWEEPS, touching.struct, touching.sweeps, touching.flag]
+        most = model.settings.bounce_iterations
+        inputs = [most, touching.struct, touching.sweeps, touching.flag]
         launch(rows.decide_kernel(model.precision), model.world_count, inputs, model.device)
+
+    @property
+    def bounces(self) -> bool:
+        return bool(self.count) and self.through_bodies is not None
+
+    def start_bounce(self, state: State, neighbors: Neighbors, bounces: Any, dt: float) -> None:
+        if self.count and self.through_bodies:
+            self.through_bodies.start(bounces)
+
+    def bounce(self, state: State, neighbors: Neighbors, bounces: Any, dt: float) -> None:
+        if self.count and self.through_bodies:
+            self.through_bodies.sweep(bounces)
 
     def measure(self, state: State, energy: wp.array, virial: wp.array) -> None:
         """Add the virial of the last substep's contacts."""

@@ -27,7 +27,7 @@ class ConstraintForce(Interaction):
         constraint: Whose law, tuples and parameters to take; made by its ``as_force()``.
 
     Raises:
-        ValueError: A compliance of 0; a ``break_force``.
+        ValueError: A compliance of 0; a ``break_force``; a yield.
 
     Example:
         >>> from particlesim import Distance
@@ -47,10 +47,15 @@ class ConstraintForce(Interaction):
                 f"{constraint.name}.as_force", f"compliance[{int(np.argmin(alpha))}]",
                 "be above 0", float(alpha.min()), "its force would be infinite: use the constraint",
             )  # fmt: skip
-        if constraint.break_force is not None:
+        if constraint.breakable:
             raise validate.fail(
                 f"{constraint.name}.as_force", "break_force", "be None", constraint.break_force,
                 "only the constraint itself breaks",
+            )  # fmt: skip
+        if getattr(constraint, "plastic", False):
+            raise validate.fail(
+                f"{constraint.name}.as_force", f"yield_{constraint.yields_by}", "be None",
+                constraint.yield_at, "only the constraint itself yields",
             )  # fmt: skip
 
     @property

@@ -66,11 +66,14 @@ class Holding(EasedConstraint):
         self.worlds_held = model.world_of[members]
         self.held.world = model.array(self.worlds_held, wp.int32)
         columns = self._columns(model, ["friction", "restitution"])
+        # Rigid bodies are hit by impulses, whether they bounce or not.
+        rigid = [any(c.rigid_bodies for c in scene.constraints) for scene in model.scenes]
+        columns["by_impulse"] = np.array(columns["restitution"]) + np.array(rigid, dtype=float)
         model.fits(self.name, numbers(columns))
         radii = model.column("radius")[members]
         model.squares_fit(self.name, "radius", np.concatenate([radii, model.apart()[0]]))
         self.Params, self.params = model.parameters(f"{type(self).__name__}Parameters", columns)
-        self.rough, self.bouncing = any(columns["friction"]), any(columns["restitution"])
+        self.rough, self.bouncing = any(columns["friction"]), columns["by_impulse"].any()
         self.moving = any(peer.moves for peer in self.peers)
         if self.moving:
             self.requires = self.requires | {"time"}
@@ -120,7 +123,7 @@ class Holding(EasedConstraint):
         self.begin_kernel = kernels.begin_kernel(self.form)
         self.project_kernel = kernels.project_kernel(self.form)
         if self.bouncing:
-            self.held.rebound = wp.zeros(self.count, dtype=each, device=device)
+            self.held.came = wp.zeros(self.count, dtype=each, device=device)
             self.held.impulse = wp.zeros(self.count, dtype=each, device=device)
             self.start_bounce_kernel = start_bounce_kernel(self.form, forces)
             self.bounce_kernel = bounce_kernel(self.form)

@@ -22,17 +22,33 @@ def contact_limits(part: Any, probe: Probe) -> list[Limit]:
         return []
     rows = part.pairs.members_host
     radius = probe.state.radius.numpy()[rows].astype(np.float64)
-    rows, radius = rows[radius > 0], radius[radius > 0]
+    return passing_limits(part.name, probe, rows[radius > 0], radius[radius > 0], "R")
+
+
+def passing_limits(
+    name: str, probe: Probe, rows: np.ndarray, lengths: np.ndarray, symbol: str
+) -> list[Limit]:
+    """No particle may go farther than its own length in a substep: v dt + a dt^2 <= that.
+
+    Args:
+        name: Of the part that asks.
+        probe: What it asks.
+        rows: Of its particles.
+        lengths: Of each, above 0 [length].
+        symbol: What a length is called.
+    """
     if not len(rows):
         return []
     v, a = probe.relative_speed(rows), np.linalg.norm(probe.acceleration[rows], axis=1)
     with np.errstate(divide="ignore"):
-        dt = 2.0 * radius / (v + np.sqrt(v**2 + 4.0 * a * radius))
+        dt = 2.0 * lengths / (v + np.sqrt(v**2 + 4.0 * a * lengths))
     k = int(np.argmin(dt))
     if not np.isfinite(dt[k]):
         return []
-    reason = f"v dt + a dt^2 = R, R = {radius[k]:.4g}, v = {v[k]:.4g}, a = {a[k]:.4g}"
-    return [Limit(part.name, "speed", float(dt[k]), reason, *probe.place(int(rows[k])))]
+    reason = (
+        f"v dt + a dt^2 = {symbol}, {symbol} = {lengths[k]:.4g}, v = {v[k]:.4g}, a = {a[k]:.4g}"
+    )
+    return [Limit(name, "speed", float(dt[k]), reason, *probe.place(int(rows[k])))]
 
 
 def crossing_limits(

@@ -40,7 +40,7 @@ class Tuples:
         self.world = np.repeat(np.arange(len(each)), np.diff(self.edges))[self.order]
         columns = [peer.columns(model, w) for w, peer in enumerate(peers)]
         self.damped = any(peer.damping.any() for peer in peers)
-        self.one_sided, self.breakable = peers[0].inequality, peers[0].break_force is not None
+        self.one_sided, self.breakable = peers[0].inequality, peers[0].breakable
         idle = {"damping": not self.damped, "break_force": not self.breakable}
         merged = {
             name: np.concatenate([part[name] for part in columns])[self.order]

@@ -59,6 +59,8 @@ class Loop:
         for bath in self.thermostats:
             if isinstance(bath, Barostat):
                 bath.interactions = self.interactions
+        for each in self.constraints:
+            each.meet(self.constraints)
         self.state, self.neighbors = State(model), Neighbors(model)
         for part in self.parts:
             part.prepare(model, self.neighbors)

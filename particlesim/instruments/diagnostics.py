@@ -52,7 +52,8 @@ class Diagnostics(Report):
 
     ``constraint_error`` is by how much the tuple that is missed most is off, in parts of its
     extent, (worlds,): that of XPBD's residual |C + alpha lam / dt^2| for the last substep's
-    multiplier, which goes to 0 with iterations and with substeps; not a number without any.
+    multiplier, which goes to 0 with iterations and with substeps; and of a :class:`FluidDensity` by
+    what part it is denser than at rest; not a number without any.
     """
 
     mass: np.ndarray

@@ -11,6 +11,7 @@ import warp as wp
 from ..constraints.boundaries.solid import SolidBoundary
 from ..constraints.constraint import Constraint
 from ..constraints.contact import Contact
+from ..constraints.fluids.density import FluidDensity
 from ..engine.execution.launch import launch
 from ..engine.source import Source
 from ..kernels.instruments import residual as kernels
@@ -28,7 +29,8 @@ def residuals(constraint: Any, sim: Source) -> tuple[np.ndarray, np.ndarray] | N
     Returns:
         (values, worlds), one a row: C of each tuple [C], where an inequality counts below 0 only
         and a broken tuple not at all; how deep each particle is in a boundary, or in the particle
-        it overlaps most [length]. None: not known for this kind.
+        it overlaps most [length]; by what part a place in a fluid is filled more than once. None:
+        not known for this kind.
     """
     return _residuals(constraint, sim)
 
@@ -47,10 +49,14 @@ def off(constraint: Constraint, sim: Source) -> tuple[np.ndarray, np.ndarray] | 
 
 
 def worst(sim: Source) -> np.ndarray:
-    """The largest :func:`off` of all tuples of each world, (worlds,); not a number without any."""
+    """The largest :func:`off` of all tuples of each world, or by what part a fluid is too dense,
+    (worlds,); not a number without any of both.
+    """
     found = np.full(sim.model.world_count, np.nan)
     for constraint in sim.constraints:
         missed = off(constraint, sim) if isinstance(constraint, Constraint) else None
+        if isinstance(constraint, FluidDensity):
+            missed = residuals(constraint, sim)
         if missed is not None:
             np.fmax.at(found, missed[1], missed[0])
     return found
@@ -78,6 +84,14 @@ def _of_boundary(constraint: SolidBoundary, sim: Source) -> tuple[np.ndarray, np
     kernel = kernels.boundary_kernel(constraint.form)
     inputs = [constraint.params, constraint.held, constraint.bodies]
     return _run(kernel, constraint.count, inputs, sim), constraint.held.world.numpy()
+
+
+@_residuals.register(FluidDensity)
+def _of_fluid(constraint: FluidDensity, sim: Source) -> tuple[np.ndarray, np.ndarray] | None:
+    if not constraint.count:
+        return None
+    error, world = constraint.errors()
+    return np.maximum(error, 0.0), world
 
 
 @_residuals.register(Contact)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -49,11 +50,17 @@ class ConstraintBase(Part):
     """
 
     rank = 0  # of what is swept first: 0 holds bodies together, 1 apart, 2 within boundaries
+    rigid_bodies = (
+        False  # an impulse goes through what it holds at once: what hits it is an impulse
+    )
     solid = False  # it is what holds a continuum, and has ``wall``
 
     def wall(self, model: Any, state: Any) -> Any:
         """A :class:`~particlesim.scene.wall.Wall`, if it is solid; also before ``prepare``."""
         raise validate.undefined(self, "wall(self, model, state)")
+
+    def meet(self, constraints: Sequence[ConstraintBase]) -> None:
+        """Before ``prepare``: all constraints of the simulation, as they were added."""
 
     def begin(self, state: Any, neighbors: Any, dt: float) -> None:
         """At the start of a substep's projection."""

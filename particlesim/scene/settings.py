@@ -49,8 +49,8 @@ class Settings:
         solver: How a sweep goes over the tuples of a constraint. ``"gauss_seidel"``: colour by
             colour, each from where the last one has left the particles; ``"jacobi"``: all at once,
             each particle split among its tuples: some sweeps more, but in no order.
-        bounce_iterations: Sweeps over velocities in a substep in which something bounces off, at
-            most; a rigid body of many particles takes some tens of them (see ``Contact``).
+        bounce_iterations: Sweeps over what bounces in a substep, at most. A pair or a rigid body
+            takes a few; rods of many particles, and many that touch at once, up to a hundred.
         integrator: ``"symplectic_euler"`` (first order, any scene); ``"velocity_verlet"`` (second
             order, with rigid constraints too); ``"yoshida4"`` and ``"yoshida6"`` (fourth and sixth
             order, 3 and 7 evaluations of the forces a substep, with forces of positions alone,
@@ -107,7 +107,7 @@ class Settings:
     constraint_tolerance: float | None = None
     acceleration: float = 0.0
     solver: str = "gauss_seidel"
-    bounce_iterations: int = 200
+    bounce_iterations: int = 40
     integrator: str | type = "symplectic_euler"
     precision: str = "float32"
     skin: float | None = None

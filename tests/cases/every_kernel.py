@@ -132,17 +132,37 @@ def fluid(periodic, walls=(), **options):
     return scene
 
 
-def heated(**options):
+def heated(walls=(), **options):
     thick = ps.ArtificialViscosity(1.0)
-    return fluid(None, equation_of_state=ps.IdealGas(1.4), viscosity=thick, **options)
+    return fluid(None, walls, equation_of_state=ps.IdealGas(1.4), viscosity=thick, **options)
+
+
+def kinds():
+    """One constraint of each kind on tuples."""
+    scene = particles()
+    soft, four = {"compliance": 0.1}, [(9, 10, 11, 12)]
+    for part in (
+        ps.Bending(four, 0.1, **soft),
+        ps.IsometricBending(four, **soft),
+        ps.Angle([(9, 10, 11)], 1.0, **soft),
+        ps.Area([(9, 10, 11)], 1.0, **soft),
+        ps.Volume(four, 1.0, **soft),
+        ps.NeoHookean(four, 1.0, 0.3),
+        ps.Attachment([13], [(0, 0, 0), (1, 0, 0)], times=[0.0, 1.0], **soft),
+    ):
+        scene.add_constraint(part)
+    return scene
 
 
 def constrained(periodic, *, breaks, bounces):
     scene = particles(periodic=periodic)
     limit = {"break_force": 1.0} if breaks else {}
     triangle = ps.Constraint(flat, [(3, 4, 5)], area=1.0, inequality=True, **limit)
-    scene.add_constraint(ps.Distance([(0, 1), (1, 2)], 1.0, compliance=1e-6, damping=0.1, **limit))
+    wire = {"compliance": 1e-6, "damping": 0.1, "yield_strain": 0.1}
+    edges = scene.add_constraint(ps.Distance([(0, 1), (1, 2)], 1.0, **wire, **limit))
     scene.add_constraint(triangle)
+    if breaks:
+        scene.add_constraint(ps.Bending([(0, 1, 2, 3)], 0.1, edges=edges))
     if not breaks:
         scene.add_interaction(ps.Constraint(flat, [(6, 7, 8)], area=1.0, compliance=1e-3)
                               .as_force())  # fmt: skip
@@ -180,9 +200,10 @@ def clustered():
     """A small cluster, and one of several chunks; all that they can do."""
     scene = particles()
     scene.add_constraint(
-        ps.ShapeMatching([range(8), range(6, 600)], 1.0, yield_strain=0.1, break_force=1.0)
+        ps.ShapeMatching([range(8), range(6, 600)], [0.0, 1.0], yield_strain=0.1, break_force=1.0)
     )
     scene.add_constraint(ps.Hinge(range(8), range(8, 16), (0, 0, 0), (0, 0, 1), break_force=1.0))
+    scene.add_constraint(ps.Attachment([0], [[(0, 0, 0)], [(0, 1, 0)]], times=[0.0, 1.0]))
     tetrahedron = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
     scene.add_constraint(ps.MeshVolume(tetrahedron, rest_volume=1.0, burst_pressure=1.0))
     return scene
@@ -191,6 +212,14 @@ def clustered():
 def attracted(s, **attributes):
     scene = particles(**attributes)
     scene.add_interaction(ps.Gravity(softening=s))
+    return scene
+
+
+def dense(*walls, **options):
+    scene = particles(**options)
+    scene.add_constraint(ps.FluidDensity(rest_density=0.5, smoothing_length=1.0))
+    for wall in walls:
+        scene.add_constraint(wall)
     return scene
 
 
@@ -219,11 +248,19 @@ SCENES = {
     "continuity": (lambda: fluid(None, density=ps.ContinuityDensity()), VERLET),
     "continuity_beside_walls": (lambda: fluid(None, [BELT], density=ps.ContinuityDensity()), {}),
     "heated_fluid": (heated, {}),
+    "heated_beside_walls": (lambda: heated([BELT]), VERLET),
     "gas_dynamics": (lambda: heated(smoothing_length=ps.AdaptiveSmoothing()), VERLET),
     "constraints": (lambda: constrained(None, breaks=False, bounces=True), {"ledger": True}),
     "boundaries": (held, {}),
-    "breaking": (lambda: constrained(BOX, breaks=True, bounces=False), {"compensated": False}),
+    "breaking": (
+        lambda: constrained(BOX, breaks=True, bounces=False),
+        {"compensated": False, "solver": "jacobi", "acceleration": 0.5,
+         "constraint_tolerance": 1e-3, **VERLET},
+    ),
     "clusters": (clustered, {"compensated": False}),
+    "kinds": (lambda: kinds(), {}),
+    "density": (lambda: dense(BELT), {}),
+    "periodic_density": (lambda: dense(periodic=BOX), {"compensated": False}),
     "tree": (lambda: attracted(0.1), {"opening_angle": 0.5}),
     "own_softening": (lambda: attracted(None, softening=0.1), {"opening_angle": 0.5}),
     **{name: (lambda name=name: load_scene(name).build(), {}) for name in ready_scenes()},
@@ -231,5 +268,5 @@ SCENES = {
 
 EVERY_KERNEL = (
     "forces", "charged", "damped", "periodic_forces", "fluid", "constraints", "breaking",
-    "gas_dynamics", "star_collision", "tree", "continuity", "clusters",
+    "gas_dynamics", "star_collision", "tree", "continuity", "clusters", "density",
 )  # fmt: skip

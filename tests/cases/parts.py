@@ -144,6 +144,9 @@ QUANTITIES = {
     ("IsometricBending", "damping"): Quantity(0.2, (2, 1, -1)),
     ("SphereBoundary", "radius"): Quantity(1.9, (1, 0, 0)),
     ("Distance", "damping"): Quantity(0.5, (0, 1, -1)),
+    # Two of the cluster fill a place: C is above 0 at its middle.
+    ("FluidDensity", "rest_density"): Quantity(0.6, (-3, 1, 0)),
+    ("FluidDensity", "compliance"): Quantity(0.05, (-2, -1, 2)),
 }
 # What laws are given to the parts that take one, with the parameters that come with it.
 LAWS = {
@@ -163,7 +166,7 @@ LEFT_OUT = {
     "density", "dimension", "viscosity", "pivot", "drawn", "mixing", "groups", "exclude", "switch",
     "method", "tolerance", "slip", "capped", "sheet", "motion", "rest", "yield_strain", "creep",
     "largest_strain", ("Electrostatics", "cutoff"), ("Electrostatics", "damping"), ("Gravity",
-    "cutoff"), "burst_pressure",
+    "cutoff"), "burst_pressure", "yield_angle", "largest_angle", "edges",
 }  # fmt: skip
 # What is of one machinery is tried by its kin in every run, and itself in the long one.
 KIN = {
@@ -171,6 +174,7 @@ KIN = {
     "MeshVolume": "Constraint", "ShapeMatching": "Constraint",
     "HarmonicBonds": "Springs", "FENEBonds": "Bonds", "HarmonicAngles": "Angles",
     "Mie": "LennardJones", "Yukawa": "PairPotential", "Morse": "PairPotential",
+    "FluidDensity": "Contact",
     "CapsuleBoundary": "Boundary", "CylinderBoundary": "Boundary", "MeshBoundary": "Boundary",
     "DFSPH": "SPH", "NeoHookean": "Constraint", "Angle": "Constraint", "Area": "Constraint",
     "Volume": "Constraint",

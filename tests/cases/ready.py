@@ -31,6 +31,7 @@ SMALL = {
     "sedov_blast": {"side": 10},
     "sloshing_tank": {"spacing": 0.05},
     "sod_tube": {"count": 90},
+    "splash": {"spacing": 0.05},
     "standing_wave": {"spacing": 1 / 16},
     "star_collision": {"count": 120},
     "taylor_green": {"count": 20},
@@ -46,14 +47,14 @@ LONG = {
     "floating_block", "freezing", "galaxy_collision", "hydrostatic_tank", "molten_salt",
     "newtons_cradle", "phase_transition", "poiseuille", "polymer_melt", "polytrope",
     "rain_on_cloth", "rigid_stack", "rising_bubble", "rope_bridge", "sand_column", "sedov_blast",
-    "sloshing_tank", "standing_wave", "star_collision", "taylor_green", "toy_star",
+    "sloshing_tank", "splash", "standing_wave", "star_collision", "taylor_green", "toy_star",
     "wrecking_ball",
 }  # fmt: skip
 # Whose kernels nobody shares, and take long to make: all that is done with them is for that run.
 LATER = {
     "balloon", "cantilever", "catenary", "cloth_drape", "floating_block", "newtons_cradle",
     "poiseuille", "rigid_stack", "rising_bubble", "rope_bridge", "sand_column", "sloshing_tank",
-    "wrecking_ball",
+    "splash", "wrecking_ball",
 }  # fmt: skip
 
 

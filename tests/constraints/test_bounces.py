@@ -139,3 +139,23 @@ def test_a_rigid_cluster_bounces_as_one(device):
         sim.run(25)
         assert sim.velocity[:, 1].mean() > -1.5
         assert sim.diagnostics().kinetic == pytest.approx(start, rel=0.02)
+
+
+@pytest.mark.parametrize("restitution", [1.0, 0.5])
+@pytest.mark.parametrize("kind", ["rods", "clusters"])
+def test_rigid_bodies_bounce_off_each_other(kind, restitution, device):
+    """One of mass 2 hits another in line: (1 - e) / 2 and (1 + e) / 2 of the velocity, within 1 %.
+
+    Momentum is kept to round-off.
+    """
+    scene = ps.Scene()
+    x = [(0, 0, 0), (0.3, 0, 0), (0.437, 0, 0), (0.737, 0, 0)]
+    scene.add_particles(x, radius=0.05, velocity=[(2, 0, 0)] * 2 + [(0, 0, 0)] * 2)
+    pairs = [(0, 1), (2, 3)]
+    scene.add_constraint(ps.Distance(pairs) if kind == "rods" else ps.ShapeMatching(pairs))
+    scene.add_constraint(ps.Contact(restitution=restitution, exclude=pairs))
+    sim = ps.Simulation(scene, ps.Settings(dt=1 / 60, substeps=10), device=device)
+    sim.run(6)
+    expected = np.repeat([1 - restitution, 1 + restitution], 2)
+    assert sim.velocity[:, 0] == pytest.approx(expected, abs=0.02)
+    assert sim.velocity[:, 0].sum() == pytest.approx(4.0, rel=1e-6)

@@ -38,7 +38,7 @@ TETRAHEDRON = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
 PARTS = {
     ps.AdaptiveSmoothing: {"eta": 1.2, "largest": 1.0},
     ps.Angle: {"triples": [(0, 1, 2)], "rest_angle": 1.0, "compliance": 0.1, "damping": 0.1,
-               "break_force": 10.0},
+               "break_force": 10.0, "yield_angle": 0.1, "creep": 2.0, "largest_angle": 0.5},
     ps.Area: {"triangles": [(0, 1, 2)], "rest_area": 1.0, "compliance": 0.1, "damping": 0.1,
               "break_force": 10.0},
     ps.Angles: {"triples": [(0, 1, 2)], "law": wave, "level": 1.0},
@@ -48,7 +48,7 @@ PARTS = {
     ps.Attachment: {"particles": [0], "target": (0, 1, 0), "compliance": 0.1, "damping": 0.1,
                     "break_force": 10.0},
     ps.Bending: {"hinges": [(0, 1, 2, 3)], "rest_angle": 1.0, "compliance": 0.1, "damping": 0.1,
-                 "break_force": 10.0},
+                 "break_force": 10.0, "yield_angle": 0.1, "creep": 2.0, "largest_angle": 0.5},
     ps.Bonds: {"pairs": [(0, 1)], "law": pull, "strength": 1.0},
     ps.Boundary: {
         "law": above, "friction": 0.1, "restitution": 0.5, "velocity": (0, 1, 0),
@@ -69,7 +69,7 @@ PARTS = {
     ps.Coulomb: {"cutoff": 2.0, "damping": 0.1},
     ps.Dihedrals: {"quadruples": [(0, 1, 2, 3)], "law": wave, "level": 1.0},
     ps.Distance: {"pairs": [(0, 1)], "rest_length": 1.0, "compliance": 0.1, "damping": 0.1,
-                  "break_force": 10.0},
+                  "break_force": 10.0, "yield_strain": 0.1, "creep": 2.0, "largest_strain": 0.5},
     ps.Drag: {"linear": 1.0, "quadratic": 1.0, "flow": (1, 0, 0)},
     ps.Electrostatics: {"method": "particle_mesh_ewald", "cutoff": 2.0, "tolerance": 1e-5},
     ps.ElasticSolid: {
@@ -81,6 +81,7 @@ PARTS = {
                  "tolerance": 1e-5},
     ps.CylinderBoundary: {"start": (0, 0, 0), "end": (1, 0, 0), "radius": 0.2},
     ps.DFSPH: {"smoothing_length": 0.1, "rest_density": 1.0},
+    ps.FluidDensity: {"rest_density": 1.0, "smoothing_length": 0.1, "compliance": 1e-6},
     ps.HarmonicAngles: {"triples": [(0, 1, 2)], "stiffness": 1.0, "rest_angle": 2.0},
     ps.HarmonicBonds: {"pairs": [(0, 1)], "stiffness": 1.0, "rest_length": 1.0},
     ps.HeightfieldBoundary: {

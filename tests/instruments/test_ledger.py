@@ -136,9 +136,7 @@ def test_a_bounce_takes_its_share(restitution, device):
 # Balances -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(k, marks=[pytest.mark.slow] * (k == "sod_tube")) for k in swept()]
-)
+@pytest.mark.parametrize("name", swept())
 def test_every_ready_scene_closes(name, device):
     module, scene = small(name)
     settings = module.settings.replace(ledger=True, substeps=min(module.settings.substeps, 100))

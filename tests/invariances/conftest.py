@@ -8,5 +8,7 @@ from cases.parts import KIN
 @pytest.hookimpl(tryfirst=True)  # before those that are marked are left out
 def pytest_collection_modifyitems(items):
     for item in items:
-        if "name" in getattr(item, "fixturenames", ()) and item.callspec.params["name"] in KIN:
+        given = item.callspec.params if hasattr(item, "callspec") else {}
+        names = [given.get("name"), *given.get("pair", ())]
+        if any(isinstance(name, str) and name in KIN for name in names):
             item.add_marker(pytest.mark.slow)

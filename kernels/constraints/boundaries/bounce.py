@@ -47,8 +47,8 @@ def start_bounce_kernel(form: Form, forces: bool) -> wp.Kernel:
         i = h.particle[k]
         w = h.world[k]
         p = parameters[w]
-        target = each()
-        if p.restitution > real(0.0) and b.w[i] > real(0.0):
+        hit = each()
+        if p.by_impulse > real(0.0) and b.w[i] > real(0.0):
             x = b.x[i]
             c = b.correction[i]
             back, N = meet(i, w, x, kept(i, b) - c, h.slack[k], p, h)
@@ -63,16 +63,16 @@ def start_bounce_kernel(form: Form, forces: bool) -> wp.Kernel:
                     came = -wp.dot(before, N[a])
                     pressed = wp.dot(c, N[a]) * inverse_dt
                     if back[a] > real(0.0) and came > wp.max(real(RESTING) * pressed, real(0.0)):
-                        target[a] = restitution * came
-                        missing = target[a] - wp.dot(v, N[a])
-                        if missing > real(ENOUGH) * target[a]:
+                        hit[a] = came
+                        missing = restitution * came - wp.dot(v, N[a])
+                        if missing > real(ENOUGH) * came:
                             bounces.again[w] = 1
-                if wp.max(target) > real(0.0):
+                if wp.max(hit) > real(0.0):
                     b.v[i] = b.v[i] - h.pressed[k] * inverse_dt
                     h.pressed[k] = vec3()
                     if p.friction > real(0.0):
                         h.grip[k] = each()
-        h.rebound[k] = target
+        h.came[k] = hit
         h.impulse[k] = each()
 
     return start_boundary_bounce
@@ -100,22 +100,22 @@ def bounce_kernel(form: Form) -> wp.Kernel:
     ):  # fmt: skip
         k = first + wp.tid()
         w = h.world[k]
-        target = h.rebound[k]
-        if bounces.running[w] == 0 or not wp.max(target) > real(0.0):
+        came = h.came[k]
+        if bounces.running[w] == 0 or not wp.max(came) > real(0.0):
             return
         i = h.particle[k]
         p = parameters[w]
         x = b.x[i]
         _back, N = meet(i, w, x, kept(i, b) - b.correction[i], h.slack[k], p, h)
         v = velocity_of(x, b.v[i], w, h)
-        mu, _restitution = touching(i, w, x, kept(i, b) - b.correction[i], p, h)
+        mu, restitution = touching(i, w, x, kept(i, b) - b.correction[i], p, h)
         sent = h.impulse[k]
         dv = vec3()
         for a in range(wp.static(sides)):
-            if target[a] > real(0.0):
+            if came[a] > real(0.0):
                 n = N[a]
-                push = wp.max(target[a] - wp.dot(v + dv, n), -sent[a])
-                if wp.abs(push) > real(ENOUGH) * target[a]:
+                push = wp.max(restitution * came[a] - wp.dot(v + dv, n), -sent[a])
+                if wp.abs(push) > real(ENOUGH) * came[a]:
                     bounces.again[w] = 1
                 sent[a] = sent[a] + push
                 dv = dv + n * push

@@ -49,7 +49,7 @@ def held_type(precision: Precision, sides: int) -> Any:
         "slack": wp.array(dtype=each),
         "marked": wp.array(dtype=wp.int32),  # worlds whose slack is to be measured
         "grip": wp.array(dtype=each),  # empty where nothing rubs
-        "rebound": wp.array(dtype=each),  # speeds to bounce off at, 0: not; empty like grip
+        "came": wp.array(dtype=each),  # speeds at which they have hit, 0: not; empty like grip
         "impulse": wp.array(dtype=each),  # that have sent them off so far, over their masses
         "pressed": wp.array(dtype=precision.vec3),  # how far it has moved them in a substep
         "pose": wp.array(dtype=pose_type(precision)),  # by world; empty where nothing moves

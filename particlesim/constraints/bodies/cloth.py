@@ -11,6 +11,7 @@ from ... import validate
 from ...scene import sample
 from ...scene.constraint_base import ConstraintBase
 from ...scene.scene import Scene
+from ..contact import Contact
 from ..distance import Distance
 from ..kinds.bending import Bending, hinges
 from .body import Body, add_body, compliance, held, massive, shares
@@ -21,8 +22,8 @@ OWNER = "Scene.add_cloth"
 def add_cloth(
     scene: Scene, vertices: Any, triangles: Any, *, areal_density: float, radius: Any = 0.0,
     stiffness: float | None = None, bending_stiffness: float = 0.0, break_force: Any = None,
-    pinned: Any = (), velocity: Any = 0.0, group: str | None = None,
-    color: Sequence[float] | None = None,
+    self_collision: bool = False, self_friction: float = 0.0, pinned: Any = (),
+    velocity: Any = 0.0, group: str | None = None, color: Sequence[float] | None = None,
 ) -> Body:  # fmt: skip
     """Add a cloth or a membrane: the vertices of a mesh, at the lengths of its edges.
 
@@ -40,13 +41,17 @@ def add_cloth(
         stiffness: Y, Young's modulus times the thickness [force/length]. None: it does not stretch.
         bending_stiffness: D = E h^3 / (12 (1 - nu^2)) [energy], at rest as it is at the start (see
             :class:`Bending`). 0: it bends freely.
-        break_force: Force at which an edge is torn for good [force], one or one for each row of
-            ``sample.edges(triangles)``; None: unbreakable.
+        break_force: Force at which an edge is torn for good [force], and with it what bends there,
+            one or one for each row of ``sample.edges(triangles)``; None: unbreakable.
+        self_collision: Whether its vertices touch each other (:class:`Contact`), but for those that
+            are held together. Their radii must be so large that none slips through a triangle, and
+            so small that ends of edges do not overlap: 0.36 to 0.5 sides of a square's halves.
+        self_friction: mu of that contact, at least 0.
         pinned: Vertices that are held, by number or (n,) bool.
         velocity, group, color: As of ``add_particles``.
 
     Returns:
-        A :class:`Body` with the constraints ``"stretch"`` and, where it resists, ``"bend"``.
+        A :class:`Body` with ``"stretch"`` and, where it has them, ``"bend"`` and ``"touch"``.
 
     Raises:
         ValueError: A triangle without area, a vertex in none, and what ``add_particles`` refuses.
@@ -61,23 +66,80 @@ def add_cloth(
     """
     x = validate.rows(OWNER, "vertices", vertices, None, 3)
     faces = validate.triangles(OWNER, triangles, len(x))
-    area = areas(OWNER, x, faces)
-    heavy = validate.number(OWNER, "areal_density", areal_density, above=0.0, unit="mass/area")
-    share = shares(faces, area, len(x))
-    massive(OWNER, "vertices", share)
-    pairs, first = sample.edges(faces), scene.particle_count
-    softness = _slenderness(x, pairs, faces, area)
-    softness *= compliance(OWNER, "stiffness", stiffness, "force/length")
-    constraints: dict[str, ConstraintBase] = {
-        "stretch": Distance(pairs + first, compliance=softness, break_force=break_force)
-    }
-    d = validate.number(OWNER, "bending_stiffness", bending_stiffness, minimum=0.0, unit="energy")
-    if d > 0.0 and len(bends := hinges(faces)):
-        constraints["bend"] = Bending(bends + first, compliance=_breadth(x, bends) / d)
-    return add_body(
-        scene, x, constraints, mass=heavy * share, radius=radius, triangles=faces,
+    mass = _masses(x, faces, areal_density)
+    mu = validate.number(OWNER, "self_friction", self_friction, minimum=0.0)
+    if self_collision:
+        _closed(x, faces, radius)
+    first = scene.particle_count
+    parts = _holding(x, faces, first, stiffness, bending_stiffness, break_force)
+    body = add_body(
+        scene, x, parts, mass=mass, radius=radius, triangles=faces,
         pinned=held(OWNER, pinned, len(x)), velocity=velocity, group=group, color=color,
     )  # fmt: skip
+    if self_collision:
+        parts["touch"] = scene.add_constraint(Contact(body.group, mu, exclude=True))
+    return body
+
+
+def _masses(x: np.ndarray, faces: np.ndarray, areal_density: float) -> np.ndarray:
+    """Of the vertices, (n,): a triangle weighs on its corners alike."""
+    share = shares(faces, areas(OWNER, x, faces), len(x))
+    massive(OWNER, "vertices", share)
+    unit = "mass/area"
+    return share * validate.number(OWNER, "areal_density", areal_density, above=0.0, unit=unit)
+
+
+def _holding(
+    x: np.ndarray, faces: np.ndarray, first: int, stiffness: float | None,
+    bending_stiffness: float, break_force: Any,
+) -> dict[str, ConstraintBase]:  # fmt: skip
+    """What holds a mesh together, whose vertices are the scene's from ``first`` on."""
+    pairs = sample.edges(faces)
+    softness = _slenderness(x, pairs, faces, areas(OWNER, x, faces))
+    softness *= compliance(OWNER, "stiffness", stiffness, "force/length")
+    stretch = Distance(pairs + first, compliance=softness, break_force=break_force)
+    d = validate.number(OWNER, "bending_stiffness", bending_stiffness, minimum=0.0, unit="energy")
+    if not d > 0.0 or not len(bends := hinges(faces)):
+        return {"stretch": stretch}
+    bend = Bending(
+        bends + first, compliance=_breadth(x, bends) / d,
+        edges=None if break_force is None else stretch,
+    )  # fmt: skip
+    return {"stretch": stretch, "bend": bend}
+
+
+def _closed(x: np.ndarray, faces: np.ndarray, radius: Any) -> None:
+    """Refuse radii by which ends of an edge overlap, or vertices slip through a triangle."""
+    pairs = sample.edges(faces)
+    r = validate.rows(OWNER, "radius", radius, len(x), None)
+    length = np.linalg.norm(x[pairs[:, 1]] - x[pairs[:, 0]], axis=1)
+    overlap = r[pairs].sum(axis=1) / length
+    gap = _widest(x[faces])
+    least = gap - r.min()
+    thin = least / np.maximum(r[faces].min(axis=1), 1e-9 * gap)
+    for excess, rows, bound, say in (
+        (overlap, pairs, 0.5 * length, "most {:.4g} [length], half of the edge {}"),
+        (thin, faces, least, "least {:.4g} [length], that nothing slips through {}"),
+    ):
+        at = int(np.argmax(excess))
+        if excess[at] > 1.0 + 1e-9:
+            raise validate.fail(
+                OWNER, "radius", f"be at {say.format(bound[at], rows[at].tolist())}",
+                float(r[rows[at]].max()), "change it, or the mesh, or leave self_collision out",
+            )  # fmt: skip
+
+
+def _widest(corners: np.ndarray) -> np.ndarray:
+    """How far a point in a triangle may be from its nearest corner, of (t, 3, 3), (t,).
+
+    The radius of the circle through the corners; in an obtuse one the place is on the longest side.
+    """
+    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1), axis=2)
+    a, b, c = np.sort(sides, axis=1).T
+    cosine = [(a**2 + b**2 - c**2) / (2 * a * b) for a, b, c in ((a, b, c), (b, c, a), (c, a, b))]
+    round_all = 0.5 * c / np.sqrt(np.maximum(1 - cosine[0] ** 2, 1e-300))
+    along = 0.5 * np.maximum(b / cosine[1], a / cosine[2])
+    return np.where(cosine[0] < 0, along, round_all)
 
 
 def areas(owner: str, x: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -109,6 +109,10 @@ class ShapeMatching(ConstraintBase):
     def kind(self) -> tuple[Any, ...]:
         return type(self), self.yield_strain is None, self.break_force is None
 
+    @property
+    def rigid_bodies(self) -> bool:  # type: ignore[override]
+        return bool((self.compliance == 0).any())
+
     # The engine's side ------------------------------------------------------------------------
 
     def prepare(self, model: Model, neighbors: Neighbors) -> None:

@@ -36,25 +36,33 @@ class Angle(Resting):
         damping: beta [energy time / rad^2], one or (m,), at least 0 (see :class:`Constraint`).
         break_force: Force on a particle beyond which it no longer bends back [force], one or (m,),
             above 0; None: unbreakable.
+        yield_angle: How far one may be from its rest angle before that flows, as a wire that is
+            bent beyond its strength [rad], one or (m,), at least 0; None: any.
+        creep: How fast it flows, at least 0 [1 / time]: d phi_0/dt is that times what is beyond
+            the yield (Bingham 1922).
+        largest_angle: How far it flows from where it began, at least 0 [rad].
 
     Raises:
         ValueError: Wrong shapes, indices or values; a middle that is on an end at the start, where
-            no rest angle is given.
+            no rest angle is given; one that yields and is rigid.
 
     Example:
         >>> Angle([(0, 1, 2)], rest_angle=3.1, compliance=1e-3).particles.tolist()
         [[0, 1, 2]]
     """
 
+    yields_by = "angle"
     argument, size, rest, exists = "triples", 3, "rest_angle", "a middle away from its ends"
 
     def __init__(
         self, triples: Any, rest_angle: Any = None, *, compliance: Any = 0.0, damping: Any = 0.0,
-        break_force: Any = None,
+        break_force: Any = None, yield_angle: Any = None, creep: float = 1.0,
+        largest_angle: float = math.pi,
     ):  # fmt: skip
         own = {"compliance": compliance, "damping": damping, "break_force": break_force}
         super().__init__(_angle, triples, rest_angle, own)
         self._within(0.0, math.pi)
+        self._yields(yield_angle, creep, largest_angle)
 
     @staticmethod
     def quantity(x: np.ndarray) -> np.ndarray:

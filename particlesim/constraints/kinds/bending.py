@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,14 @@ import warp as wp
 
 from ... import validate
 from ...engine.model import Model
+from ...engine.neighbors.lists import Neighbors
+from ...engine.state import State
 from ...kernels.constraints.kinds.coordinates import hinge_evaluation
+from ...scene.constraint_base import ConstraintBase
 from ...scene.law import law
+from ..distance import Distance
 from .rest import Resting
+from .tearing import Tearing
 
 THIN = 1e-6  # a triangle whose height over its edge is a smaller part of it is none
 
@@ -54,25 +60,40 @@ class Bending(Resting):
         damping: beta [energy time / rad^2], one or (m,), at least 0 (see :class:`Constraint`).
         break_force: Force on a particle beyond which a hinge no longer bends back [force], one or
             (m,), above 0; None: unbreakable.
+        yield_angle: How far one may be from its rest angle before that flows, as a wire that is
+            bent beyond its strength [rad], one or (m,), at least 0; None: any.
+        creep: How fast it flows, at least 0 [1 / time]: d theta_0/dt is that times what is beyond
+            the yield (Bingham 1922).
+        largest_angle: How far it flows from where it began, at least 0 [rad].
+        edges: A ``Distance`` with a ``break_force`` along the sides of the triangles, which the
+            scene has before: a hinge goes with the first side of its triangles that is torn.
 
     Raises:
         ValueError: Wrong shapes, indices or values; a triangle without an area at the start, where
-            no rest angle is given.
+            no rest angle is given; a hinge that yields and is rigid.
 
     Example:
         >>> Bending([(0, 1, 2, 3)], rest_angle=0.0, compliance=1e-3).particles.tolist()
         [[0, 1, 2, 3]]
     """
 
+    yields_by = "angle"
     argument, size, rest, exists = "hinges", 4, "rest_angle", "two triangles with an area"
 
     def __init__(
         self, hinges: Any, rest_angle: Any = None, *, compliance: Any = 0.0, damping: Any = 0.0,
-        break_force: Any = None,
+        break_force: Any = None, yield_angle: Any = None, creep: float = 1.0,
+        largest_angle: float = math.pi, edges: Distance | None = None,
     ):  # fmt: skip
         own = {"compliance": compliance, "damping": damping, "break_force": break_force}
         super().__init__(_fold, hinges, rest_angle, own)
         self._within(-math.pi * (1 + 1e-15), math.pi * (1 + 1e-15))
+        self._yields(yield_angle, creep, largest_angle)
+        if edges is not None and getattr(edges, "break_force", None) is None:
+            raise validate.fail(
+                self.name, "edges", "be a Distance with a break_force", edges, "leave it out"
+            )
+        self.edges = edges
 
     @staticmethod
     def quantity(x: np.ndarray) -> np.ndarray:
@@ -82,6 +103,40 @@ class Bending(Resting):
         high = np.minimum(np.linalg.norm(m, axis=1), np.linalg.norm(n, axis=1)) / length**2
         fold = np.arctan2(np.sum(np.cross(m, n) * edge, axis=1) / length, np.sum(m * n, axis=1))
         return np.where(high > THIN, fold, np.nan)
+
+    def kind(self) -> tuple[Any, ...]:
+        return (*super().kind(), self.edges is None)
+
+    @property
+    def breakable(self) -> bool:
+        return super().breakable or self.edges is not None
+
+    def meet(self, constraints: Sequence[ConstraintBase]) -> None:
+        if self.edges is None:
+            return
+        mine = [peer.edges for peer in self.peers]
+        before = list(constraints)[: list(constraints).index(self)]
+        found = [
+            each
+            for each in before
+            if isinstance(each, Distance) and [*map(id, each.peers)] == [*map(id, mine)]
+        ]
+        if not found:
+            raise validate.fail(
+                self.name, "edges", "be in the scene before the hinges", self.edges,
+                "add it first",
+            )  # fmt: skip
+        self.edges = found[0]
+
+    def attach(self, model: Model, state: State) -> None:
+        super().attach(model, state)
+        if self.count and self.edges is not None:
+            self.tearing = Tearing(self, self.edges)
+
+    def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
+        super().finish(state, neighbors, dt)
+        if self.count and self.edges is not None:
+            self.tearing.tear()
 
     def evaluation(self, model: Model, item: Any) -> wp.Function:
         return hinge_evaluation(model.precision, item)

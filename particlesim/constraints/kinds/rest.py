@@ -10,10 +10,10 @@ from ... import validate
 from ...engine import topology
 from ...engine.model import Model
 from ...scene.law import Law
-from ..constraint import Constraint
+from ..solving.plasticity import Plastic
 
 
-class Resting(Constraint):
+class Resting(Plastic):
     """Base of C(x) = q(x) - q_0, with q_0 = q at the start where none is given.
 
     A subclass names its arguments and measures q in NumPy; NaN where a tuple has none.
@@ -22,7 +22,6 @@ class Resting(Constraint):
     relative = True
     argument: str  # what the tuples are called
     size: int  # particles of a tuple
-    rest: str  # what q_0 is called
     exists: str  # what a tuple must have for q to be there, for errors
 
     def __init__(self, law: Law, tuples: Any, rest: Any, options: dict[str, Any]):

@@ -20,6 +20,11 @@ class ReadTuples(ConstraintBase):
     strain: wp.array  # force of each tuple
     break_force: np.ndarray | None
 
+    @property
+    def breakable(self) -> bool:
+        """Whether a tuple may be gone for good."""
+        return self.break_force is not None
+
     def _strain(self, may_break: bool) -> None:
         """Evaluate the forces; what exceeds its limit may break."""
         raise NotImplementedError
@@ -31,7 +36,7 @@ class ReadTuples(ConstraintBase):
         return self._listed(self.strain.numpy(), part)
 
     def read_broken(self, part: Part) -> np.ndarray:
-        if self.count and self.break_force is not None:
+        if self.count and self.breakable:
             return self._listed(self.struct.broken.numpy(), part) > 0
         return self._listed(np.zeros(self.count), part) > 0
 

@@ -27,6 +27,7 @@ import warp as wp
 from ...constraints.boundaries.solid import SolidBoundary
 from ...constraints.constraint import Constraint
 from ...constraints.contact import Contact
+from ...constraints.fluids.density import FluidDensity
 from ...engine.loop import Loop
 from ..diagnostics import measure, undisturbed
 from ..residuals import UNMET, off, residuals
@@ -36,6 +37,8 @@ from .limits import GROWN, Limits
 
 DRIFT = 0.1  # of the largest kinetic energy
 DEEP = 0.2  # of a radius
+THROUGH = 1.0  # radii: who is so deep is on its way through
+DENSE = 0.1  # of the rest density
 FIRST = 8  # frames: what is ahead of a start is looked at as a run begins
 SHARE = 50  # times its own cost, from one round to the next
 ROUND = 6e6  # what a round costs beside three evaluations of the forces, in pairs of these
@@ -139,7 +142,7 @@ class Rounds:
         return f"use more substeps than {settings.substeps}"
 
     def _constraints(self) -> None:
-        """Tell of what was missed in the last round, too."""
+        """Tell of what was missed in the last round, too, or is by more than a radius."""
         loop, missed = self.loop, set()
         with undisturbed(loop):
             loop.neighbors.update_for_constraints(loop.state)
@@ -148,11 +151,12 @@ class Rounds:
                 for worst, world, what, most in _unmet(constraint, loop):
                     for w in np.unique(world[worst > most]).tolist():
                         missed.add((id(constraint), w))
-                        if (id(constraint), w) in self.missed:
-                            size = f"{worst[world == w].max():.2g}"
+                        size = worst[world == w].max()
+                        within = most == DEEP and size > THROUGH
+                        if within or (id(constraint), w) in self.missed:
                             must = f"{constraint.name} must hold within {most:.0%} of {what}"
                             remedy = "use more substeps or iterations, or see whether it can hold"
-                            self._tell(id(constraint), w, f"{must}, got {size} of it", remedy)
+                            self._tell(id(constraint), w, f"{must}, got {size:.2g} of it", remedy)
         self.missed = missed
 
     def _tell(self, about: Any, w: int, must: str, remedy: str) -> None:
@@ -186,6 +190,9 @@ def _unmet(constraint: Any, loop: Loop) -> list[tuple[np.ndarray, np.ndarray, st
     if isinstance(constraint, Constraint):
         found = off(constraint, loop)
         return [] if found is None else [(*found, "its particles' distance", UNMET)]
+    if isinstance(constraint, FluidDensity) and constraint.count:
+        error, world = constraint.errors(forgiven=True)
+        return [(error, world, "its rest density", DENSE)]
     if not isinstance(constraint, Contact | SolidBoundary):
         return []
     missed = residuals(constraint, loop)

@@ -78,7 +78,6 @@ def of_constraints():
         ps.Constraint(laws.squared_distance, [(0, 1)], rest=1.0)),
         lambda done: abs(np.linalg.norm(done.x[-1, 1] - done.x[-1, 0]) - 1) / 0.1, 30, FRAME,
         names="Constraint")
-    yield Row("rods and Verlet", partial(rope, 3), never, knobs=VERLET, names="integrator")
     yield Row("a rope that breaks at once", partial(rope, 10, 10.0, break_force=1e-6),
         lambda done: 0.0 if done.sim.broken(done.sim.constraints[0]).any() else np.inf, 5, FRAME)
     for beta in (1e3, 1e6):

@@ -111,6 +111,10 @@ def test_ropes_that_are_none_are_refused(refused, options, match):
         ({"bending_stiffness": -1.0}, "bending_stiffness must be at least 0"),
         ({"pinned": [True]}, "pinned must be numbers of points"),
         ({"radius": -1.0}, "radius"),
+        ({"self_friction": -1.0}, "self_friction must be at least 0"),
+        ({"self_collision": True}, "radius must be at least 0.3536"),
+        ({"self_collision": True, "radius": 0.17}, "radius must be at least 0.183"),
+        ({"self_collision": True, "radius": 0.26}, "radius must be at most 0.25"),
     ],
 )
 def test_cloths_that_are_none_are_refused(refused, options, match):

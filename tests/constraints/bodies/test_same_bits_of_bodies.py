@@ -14,6 +14,7 @@ def falling(tilt):
     sheet, triangles = ps.sample.rectangle((-0.5, 0.3, -0.5), [(0, 0, 1), (1, 0, 0)], cells=8)
     scene.add_cloth(
         sheet, triangles, areal_density=0.2, stiffness=500.0, radius=0.05, break_force=3.0,
+        bending_stiffness=1e-3, self_collision=True,
         pinned=np.abs(sheet[:, 0]) > 0.49,
     )  # fmt: skip
     line = ps.sample.curve([(-0.4, 0.5, 0), (0.4, 0.5 + tilt, 0.1)], 0.1)

@@ -1,0 +1,1 @@
+"""Fluids of constraints on density: what pairs add, and what is made of the sums."""

@@ -1,0 +1,1 @@
+"""Fluids by constraints on density."""
