@@ -71,8 +71,8 @@ def test_a_chain_of_a_thousand_links_falls(tolerance, device):
         kinetic = float(sim.diagnostics().kinetic[0])
         energy.append(kinetic + GRAVITY * masses[1:] @ sim.position[1:, 1])
         lengths.append(length(sim))
-    # It is let go with none. A chain whose lengths are known to 1 % has its weight, 1 kg, on heights
-    # known to 1 % of 5 m.
+    # It is let go with none. Lengths that are known to 1 % have its weight, 1 kg, on heights that
+    # are known to 1 % of 5 m.
     assert max(energy) < 0.01 * 5 * GRAVITY
     assert np.isfinite(sim.position).all()
     assert tolerance is None or max(lengths) < 10 * (1 + np.sqrt(2) * tolerance)
