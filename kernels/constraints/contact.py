@@ -15,6 +15,23 @@ REST = 2.0  # times the speed that forces add in a substep: who comes slower doe
 
 
 @functools.cache
+def entry_type(precision: Precision) -> Any:
+    """A pair as the row of one of its two has it, close together in memory."""
+    vec3, real = precision.vec3, precision.scalar
+    fields = {
+        "x_ij": vec3,  # of the pair where the substep began
+        "n": vec3,  # and its direction
+        "rub": vec3,  # multiplier times direction of friction
+        "reach": real,  # the distance that they keep
+        "rise": real,  # how much farther apart a bounce takes the pair
+        "lack": real,  # how much they are short of it as a sweep begins
+        "lam": real,
+        "partner": wp.int32,  # the slot of the other one
+    }
+    return structure(f"Touch_{precision.name}", fields)
+
+
+@functools.cache
 def touching_type(precision: Precision) -> Any:
     """Rows of who touches whom in a substep, by particle; each pair is in the rows of both.
 
@@ -46,15 +63,7 @@ def touching_type(precision: Precision) -> Any:
         "hit": wp.array(dtype=wp.int32),  # something bounces in this substep
         "running": wp.array(dtype=wp.int32),  # to be swept again
         "unsettled": wp.array(dtype=wp.int32),  # some pair is still short of its distance
-        # The rows.
-        "partner": wp.array(dtype=wp.int32),  # its slot
-        "x_ij": wp.array(dtype=vec3),  # of the pair where the substep began
-        "n": wp.array(dtype=vec3),  # and its direction
-        "rise": wp.array(dtype=real),  # how much farther apart a bounce takes the pair
-        "reach": wp.array(dtype=real),  # the distance that they keep
-        "lack": wp.array(dtype=real),  # how much they are short of it as a sweep begins
-        "lam": wp.array(dtype=real),
-        "rub": wp.array(dtype=vec3),  # multiplier times direction of friction
+        "entry": wp.array(dtype=entry_type(precision)),  # the rows
         "unit": real,  # of mass, as of the bodies
         "relaxation": real,
         "inverse_dt": real,  # 0 in a static projection

@@ -17,10 +17,11 @@ import warp as wp
 from ..engine.loops import Pairs
 from ..precision import Precision, function, register
 from .constraints import bodies_type, place_function, rounding_function
-from .contact import touching_type
+from .contact import entry_type, touching_type
 
 SETTLED = 1e-6  # parts of its way that a bounce may be short of
-ROUNDINGS = 8.0  # of the distance of a pair, besides
+CALM = 0.05  # and parts of the way up to which what forces push rests
+ROUNDINGS = 8.0  # and of the distance of a pair
 
 
 def largest_eigenvalue(precision: Precision) -> wp.Function:
@@ -54,26 +55,24 @@ def largest_eigenvalue(precision: Precision) -> wp.Function:
 
 @functools.cache
 def _missing_function(precision: Precision) -> wp.Function:
-    """``missing(at, u, t)``: how far an entry's pair is short of its distance on its way u.
+    """``missing(e, u)``: how far an entry's pair is short of its distance on its way u.
 
     A bounce sends it off along the direction of the start, by e times the way it came. What keeps
     its distance, and has not pushed, is short of nothing: -1.
     """
-    vec3, real, Touching = precision.vec3, precision.scalar, touching_type(precision)
+    vec3, real, Entry = precision.vec3, precision.scalar, entry_type(precision)
 
-    def missing(at: wp.int64, u: vec3, t: Touching):
-        x_ij, reach, rise = t.x_ij[at], t.reach[at], t.rise[at]
-        y = x_ij + u
-        n = t.n[at]
-        along = wp.dot(n, y)
+    def missing(e: Entry, u: vec3):
+        reach, y = e.reach, e.x_ij + u
+        along = wp.dot(e.n, y)
         r2 = wp.dot(y, y)
         lack = real(-1.0)
-        if r2 < reach * reach or along < real(0.0) or rise > real(0.0) or t.lam[at] > real(0.0):
+        if r2 < reach * reach or along < real(0.0) or e.rise > real(0.0) or e.lam > real(0.0):
             r = wp.sqrt(r2)
             # Past the middle the distance is no measure.
             lack = reach - wp.where(along < real(0.5) * r, along, r)
-            if rise > real(0.0):
-                lack = wp.max(reach - wp.dot(n, x_ij), rise) - wp.dot(n, u)
+            if e.rise > real(0.0):
+                lack = wp.max(reach - wp.dot(e.n, e.x_ij), e.rise) - wp.dot(e.n, u)
         return lack
 
     return function(missing)
@@ -92,7 +91,7 @@ def _stirred_function(precision: Precision) -> wp.Function:
         if again == 0 or t.stir[s] > real(0.0):
             return True
         for k in range(count):
-            if t.stir[t.partner[row + wp.int64(k)]] > real(0.0):
+            if t.stir[t.entry[row + wp.int64(k)].partner] > real(0.0):
                 return True
         return False
 
@@ -130,10 +129,11 @@ def crowding_kernel(precision: Precision, params: Any) -> wp.Kernel:
         way_i, total = t.way[s], six()
         for k in range(count):
             at = begin + wp.int64(k)
-            lack = missing(at, way_i - t.way[t.partner[at]], t)
-            t.lack[at] = lack
-            if lack > real(0.0) or t.lam[at] > real(0.0):
-                m = t.n[at]
+            e = t.entry[at]
+            e.lack = missing(e, way_i - t.way[e.partner])
+            t.entry[at] = e
+            if e.lack > real(0.0) or e.lam > real(0.0):
+                m = e.n
                 total += six(
                     m[0] * m[0], m[0] * m[1], m[0] * m[2], m[1] * m[1], m[1] * m[2], m[2] * m[2]
                 )
@@ -151,6 +151,21 @@ def crowding_kernel(precision: Precision, params: Any) -> wp.Kernel:
     return count_contacts
 
 
+def _rubbed_function(precision: Precision) -> wp.Function:
+    """``rubbed(e, s, most, t)``: what friction of an entry takes back of the way in all."""
+    real, Touching, Entry = precision.scalar, touching_type(precision), entry_type(precision)
+
+    def rubbed(e: Entry, s: int, most: real, t: Touching):
+        u, n = t.way[s] - t.way[e.partner], e.n
+        rub = e.rub - (u - n * wp.dot(u, n)) / (t.grip[s] + t.grip[e.partner])
+        length = wp.length(rub)
+        if length > most:
+            rub = rub * (most / length)
+        return rub
+
+    return function(rubbed)
+
+
 @functools.cache
 def push_kernel(precision: Precision, params: Any, compensated: bool) -> wp.Kernel:
     """Kernel: multipliers of all pairs grow by what is missing, and particles move by w n dlam.
@@ -163,7 +178,7 @@ def push_kernel(precision: Precision, params: Any, compensated: bool) -> wp.Kern
     """
     vec3, real = precision.vec3, precision.scalar
     Bodies, Touching = bodies_type(precision), touching_type(precision)
-    stirred = _stirred_function(precision)
+    stirred, rubbed = _stirred_function(precision), _rubbed_function(precision)
     tiny = real(ROUNDINGS * float(np.finfo(precision.numpy).eps))
     kept, place = rounding_function(precision, compensated), place_function(precision, compensated)
 
@@ -174,10 +189,8 @@ def push_kernel(precision: Precision, params: Any, compensated: bool) -> wp.Kern
     ):  # fmt: skip
         s = first + wp.tid()
         i = pairs.order[s]
-        world = pairs.world[s]
+        world, count, begin = pairs.world[s], wp.min(t.found[i], t.room[i]), t.row[i]
         p = parameters[world]
-        count = wp.min(t.found[i], t.room[i])
-        begin = t.row[i]
         if count == 0 or t.running[world] == 0 or not stirred(s, begin, count, again, t):
             return
         share_i, stirs = t.share[s], real(0.0)
@@ -185,31 +198,28 @@ def push_kernel(precision: Precision, params: Any, compensated: bool) -> wp.Kern
         total, w, virial = vec3(), b.w[i] * t.unit, wp.float64(0.0)
         for k in range(count):
             at = begin + wp.int64(k)
-            lack, lam, j = t.lack[at], t.lam[at], t.partner[at]
-            stir = wp.max(t.stir[s], t.stir[j])
-            if lam > real(0.0) and again != 0 and stir == real(0.0):
-                virial += wp.float64(lam * wp.dot(t.n[at], t.x_ij[at]))
-            elif lack > real(0.0) or lam > real(0.0):
-                n = t.n[at]
+            e = t.entry[at]
+            j, stir = e.partner, wp.max(t.stir[s], t.stir[e.partner])
+            if again != 0 and stir == real(0.0):  # the other one may not look at it
+                virial += wp.float64(e.lam * wp.dot(e.n, e.x_ij))
+            elif e.lack > real(0.0) or e.lam > real(0.0):
                 soft = share_i + t.share[j]
-                change = (lack - alpha * lam) / (soft + alpha)
-                more = wp.max(lam + change, real(0.0))
-                total += n * (more - lam)
+                change = (e.lack - alpha * e.lam) / (soft + alpha)
+                more = wp.max(e.lam + change, real(0.0))
+                total += e.n * (more - e.lam)
                 if stir > real(0.0) and soft > real(0.0):
-                    fine = real(SETTLED) * stir + tiny * t.reach[at]
-                    if wp.abs(lack - alpha * more) > fine:
+                    fine = real(SETTLED) * stir + real(CALM) * (t.calm[s] + t.calm[j])
+                    fine += tiny * e.reach
+                    if wp.abs(e.lack - alpha * more) > fine:
                         stirs = stir
                         t.unsettled[world] = 1
-                t.lam[at] = more
                 if p.friction > real(0.0):
-                    u = t.way[s] - t.way[j]
-                    rub = t.rub[at] - (u - n * wp.dot(u, n)) / (t.grip[s] + t.grip[j])
-                    most, length = p.friction * more, wp.length(rub)
-                    if length > most:
-                        rub = rub * (most / length)
-                    total += rub - t.rub[at]
-                    t.rub[at] = rub
-                virial += wp.float64(more * wp.dot(n, t.x_ij[at]))
+                    rub = rubbed(e, s, p.friction * more, t)
+                    total += rub - e.rub
+                    e.rub = rub
+                e.lam = more
+                t.entry[at] = e
+                virial += wp.float64(more * wp.dot(e.n, e.x_ij))
         t.stirs[s] = stirs
         rate = wp.float64(t.inverse_dt)
         t.virial[i] = virial * rate * rate * wp.float64(t.unit)

@@ -8,7 +8,7 @@ import warp as wp
 from ..engine.loops import Pairs, Periodicity, box_type, minimum_image
 from ..precision import APART, Precision, function, register
 from .constraints import bodies_type
-from .contact import MARGIN, excludes, touching_type
+from .contact import MARGIN, entry_type, excludes, touching_type
 
 TOUCH = 1e-4  # parts of the lesser radius: what still counts as touching, where contacts bounce
 
@@ -51,6 +51,23 @@ def _meet_function(precision: Precision) -> wp.Function:
     return function(meet)
 
 
+def _touches_function(precision: Precision) -> wp.Function:
+    """``touches(s, o, x_ij, bounces, dt, t)``: whether two slots touch on the way of a substep, or
+    what rests is so near to another that it may be pushed there.
+    """
+    vec3, real, Touching = precision.vec3, precision.scalar, touching_type(precision)
+    near, exactly, meet = real(MARGIN), real(TOUCH), _meet_function(precision)
+
+    def touches(s: int, o: int, x_ij: vec3, bounces: bool, dt: real, t: Touching):
+        R_i, R_j = t.radius[s], t.radius[o]
+        v, calm = t.v[s] - t.v[o], t.calm[s] + t.calm[o]
+        rests = wp.dot(v, v) * dt * dt < calm * calm or not bounces
+        touch = R_i + R_j + wp.min(R_i, R_j) * wp.where(rests, near, exactly)
+        return meet(x_ij, t.way[s] - t.way[o], touch)
+
+    return function(touches)
+
+
 @functools.cache
 def find_kernel(precision: Precision, periodic: Periodicity, params: Any) -> wp.Kernel:
     """Kernel: the rows of a substep, with multipliers of 0.
@@ -59,11 +76,10 @@ def find_kernel(precision: Precision, periodic: Periodicity, params: Any) -> wp.
     is found as well. Of what moves and bounces it is these alone: what they push is met in the next
     substep, when the speed that it came with is known. Of what rests all that are near are found.
     """
-    vec3, real, Box = precision.vec3, precision.scalar, box_type(precision)
+    real, Box = precision.scalar, box_type(precision)
     Touching, Bodies = touching_type(precision), bodies_type(precision)
     apart, image = apart_function(precision), minimum_image(precision, periodic)
-    meet = _meet_function(precision)
-    near, exactly = real(MARGIN), real(TOUCH)
+    touches, Entry = _touches_function(precision), entry_type(precision)
 
     @register
     def find_contacts(
@@ -83,31 +99,25 @@ def find_kernel(precision: Precision, periodic: Periodicity, params: Any) -> wp.
             if other == s or wp.dot(x_ij, x_ij) > span * span:
                 continue
             j = pairs.order[other]
-            u = t_out.way[s] - t_out.way[other]
-            R_i, R_j = t_out.radius[s], t_out.radius[other]
-            reach = R_i + R_j
-            v = t_out.v[s] - t_out.v[other]
-            calm = t_out.calm[s] + t_out.calm[other]
-            rests = wp.dot(v, v) * dt * dt < calm * calm or not bounces
-            touch = reach + wp.min(R_i, R_j) * wp.where(rests, near, exactly)
-            near_by = meet(x_ij, u, touch) and b.w[i] + b.w[j] > real(0.0)
-            if near_by and not excludes(apart_of, i, j):
+            if b.w[i] + b.w[j] == real(0.0) or excludes(apart_of, i, j):
+                continue
+            if touches(s, other, x_ij, bounces, dt, t_out):
                 if found < room:
+                    v = t_out.v[s] - t_out.v[other]
+                    calm = t_out.calm[s] + t_out.calm[other]
                     at = begin + wp.int64(found)
                     d, d2 = apart(s, other, x_ij, wp.dot(x_ij, x_ij), p.closest_squared)
                     n = d / wp.sqrt(d2)
-                    t_out.partner[at] = other
-                    t_out.reach[at] = reach
-                    t_out.x_ij[at] = x_ij
-                    t_out.n[at] = n
-                    t_out.rise[at] = real(0.0)
+                    e = Entry()
+                    e.partner = other
+                    e.reach = t_out.radius[s] + t_out.radius[other]
+                    e.x_ij = x_ij
+                    e.n = n
                     if bounces and -wp.dot(n, v) * dt > calm:
-                        t_out.rise[at] = -p.restitution * wp.dot(n, v) * dt
+                        e.rise = -p.restitution * wp.dot(n, v) * dt
                         t_out.hit[w] = 1
                         stir = wp.max(stir, -wp.dot(n, v) * dt)
-                    t_out.lam[at] = real(0.0)
-                    if p.friction > real(0.0):
-                        t_out.rub[at] = vec3()
+                    t_out.entry[at] = e
                 found += 1
         t_out.stir[s] = stir
         t_out.found[i] = found

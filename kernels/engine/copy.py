@@ -39,6 +39,7 @@ def zero_kernel(dtype: Any, block: int = 1) -> wp.Kernel:
 
     def zero_natively(first: int, last: int, target: wp.array(dtype=dtype)): ...
 
+    number = not hasattr(dtype, "_wp_scalar_type_")  # else a vector, a matrix
     snippet = f"__builtin_memset({_bytes('target', dtype)}, 0, {_size(dtype)});"
     zero = native(zero_natively, snippet, False)
 
@@ -48,7 +49,7 @@ def zero_kernel(dtype: Any, block: int = 1) -> wp.Kernel:
         if wp.static(block > 1):
             zero(i, wp.min(i + wp.static(block), target_out.shape[0]), target_out)
         else:
-            if wp.static(dtype in wp.types.scalar_types):
+            if wp.static(number):
                 target_out[i] = dtype(0)
             else:
                 target_out[i] = dtype()

@@ -9,9 +9,9 @@ import warp as wp
 
 from ..engine.model import Model
 from ..engine.neighbors.lists import Rows
-from ..kernels.constraints.contact import touching_type
+from ..kernels.constraints.contact import entry_type, touching_type
 
-FEW = 8  # entries of a row to begin with
+FEW = 12  # entries of a row to begin with: as many balls of one size touch another
 
 
 class Touching(Rows):
@@ -60,11 +60,7 @@ class Touching(Rows):
         struct.row = model.array(edges[:-1], wp.int64)
         struct.room = model.array(self.room, wp.int32)
         entries = int(edges[-1])
-        struct.partner = self._zeros(entries, wp.int32)
-        for name in ("x_ij", "n", *(["rub"] if self.rough else [])):
-            setattr(struct, name, self._zeros(entries, precision.vec3))
-        for name in ("rise", "reach", "lack", "lam"):
-            setattr(struct, name, self._zeros(entries, precision.scalar))
+        struct.entry = self._zeros(entries, entry_type(precision))
         self.generation += 1
 
     def run(self) -> None:
@@ -77,7 +73,10 @@ class Touching(Rows):
         if not self.overflow.numpy()[0]:
             return False
         most = self.struct.most.numpy()
-        self.room = np.where(most > self.room, most + FEW, self.room)
+        # Where one has become too short, those of its like will be; few large ones are not these.
+        self.room = np.maximum(
+            np.where(most > self.room, 2 * most, self.room), int(np.median(most))
+        )
         self._make_room()
         self.overflow.zero_()
         return True

@@ -107,7 +107,7 @@ class Settings:
     constraint_tolerance: float | None = None
     acceleration: float = 0.0
     solver: str = "gauss_seidel"
-    bounce_iterations: int = 200
+    bounce_iterations: int = 40
     integrator: str | type = "symplectic_euler"
     precision: str = "float32"
     skin: float | None = None

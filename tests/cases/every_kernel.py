@@ -132,9 +132,9 @@ def fluid(periodic, walls=(), **options):
     return scene
 
 
-def heated(**options):
+def heated(walls=(), **options):
     thick = ps.ArtificialViscosity(1.0)
-    return fluid(None, equation_of_state=ps.IdealGas(1.4), viscosity=thick, **options)
+    return fluid(None, walls, equation_of_state=ps.IdealGas(1.4), viscosity=thick, **options)
 
 
 def kinds():
@@ -248,6 +248,7 @@ SCENES = {
     "continuity": (lambda: fluid(None, density=ps.ContinuityDensity()), VERLET),
     "continuity_beside_walls": (lambda: fluid(None, [BELT], density=ps.ContinuityDensity()), {}),
     "heated_fluid": (heated, {}),
+    "heated_beside_walls": (lambda: heated([BELT]), VERLET),
     "gas_dynamics": (lambda: heated(smoothing_length=ps.AdaptiveSmoothing()), VERLET),
     "constraints": (lambda: constrained(None, breaks=False, bounces=True), {"ledger": True}),
     "boundaries": (held, {}),

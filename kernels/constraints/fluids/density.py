@@ -9,8 +9,7 @@ Every constraint reaches tens of particles, and so as many constraints meet at e
 counts as e_k times as light as it is: sum_k w_k |sum_i g_ki l_i|^2 is how far multipliers l move
 particles, g_ki the gradient of C_i by k, and by Cauchy and Schwarz at most
 
-    sum_i l_i^2 D_i,   D_i = sum_k w_k e_k |g_ki|,   e_k the largest eigenvalue of
-                                                     sum_i g_ki g_ki^T / |g_ki|
+    sum_i l_i^2 D_i,  D_i = sum_k w_k e_k |g_ki|,  e_k largest eigenvalue of sum_i g g^T / |g|
 
 so that l_i = C_i / D_i never overshoots, in any arrangement; that is mass splitting (Tonge,
 Benevolenski and Voroshilov 2012) with parts as gradients have them. One pair is met at once, and in

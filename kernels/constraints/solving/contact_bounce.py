@@ -36,9 +36,10 @@ def start_kernel(precision: Precision) -> wp.Kernel:
         for k in range(wp.min(t.found[i], t.room[i])):
             at = t.row[i] + wp.int64(k)
             push_out[at] = real(0.0)
-            if t.rise[at] > real(0.0) and t.lam[at] > real(0.0):
+            e = t.entry[at]
+            if e.rise > real(0.0) and e.lam > real(0.0):
                 many += real(1.0)
-                taken += t.n[at] * t.lam[at]
+                taken += e.n * e.lam
                 bounces.again[pairs.world[s]] = 1
         many_out[i] = many
         b.v[i] = b.v[i] - taken * (b.w[i] * b.unit * t.inverse_dt)
@@ -72,11 +73,12 @@ def find_kernel(precision: Precision) -> wp.Kernel:
         for k in range(wp.min(t.found[i], t.room[i])):
             at = t.row[i] + wp.int64(k)
             more_out[at] = real(0.0)
-            if t.rise[at] > real(0.0) and t.lam[at] > real(0.0):
-                j = pairs.order[t.partner[at]]
-                target = t.rise[at] * t.inverse_dt
+            e = t.entry[at]
+            if e.rise > real(0.0) and e.lam > real(0.0):
+                j = pairs.order[e.partner]
+                target = e.rise * t.inverse_dt
                 light = (b.w[i] * many[i] + b.w[j] * many[j]) * b.unit
-                short = target - wp.dot(t.n[at], b.v[i] - b.v[j])
+                short = target - wp.dot(e.n, b.v[i] - b.v[j])
                 push = wp.max(push_io[at] + short / light, real(0.0))
                 more_out[at] = push - push_io[at]
                 if wp.abs(more_out[at]) * light > real(ENOUGH) * target:
@@ -108,8 +110,9 @@ def give_kernel(precision: Precision) -> wp.Kernel:
         total = vec3()
         for k in range(wp.min(t.found[i], t.room[i])):
             at = t.row[i] + wp.int64(k)
-            if t.rise[at] > real(0.0) and t.lam[at] > real(0.0):
-                total += t.n[at] * more[at]
+            e = t.entry[at]
+            if e.rise > real(0.0) and e.lam > real(0.0):
+                total += e.n * more[at]
         b.v[i] = b.v[i] + total * (b.w[i] * b.unit)
 
     return give_contact_pushes

@@ -144,7 +144,7 @@ def _drags(seen: Seen, j: str) -> list[str]:
     return lines
 
 
-def _approach(each: tuple[int, ...], sticky: tuple[bool, ...]) -> str:
+def approaching(each: tuple[int, ...], sticky: tuple[bool, ...]) -> str:
     """Source of v_ij' . x_ij' of the image in these places."""
     odd = sum(sticky[a] for a in each) % 2 == 1
     plus, minus = ("-", "+") if odd else ("+", "-")
@@ -160,7 +160,7 @@ def pull_lines(seen: Seen, j: str, arm: str, also: list[str]) -> list[str]:
     """Source of w of every image, which b of each of its places takes up along an ``arm``."""
     lines = [*square_lines(seen), *(f"b{a} = real(0.0)" for a in range(seen.places))]
     for n, each in enumerate(seen.sets):
-        closing = "approach" if seen.sticky is None else _approach(each, seen.sticky)
+        closing = "approach" if seen.sticky is None else approaching(each, seen.sticky)
         square = "".join(f" + e{a}" for a in each)
         lines.append(f"g{n} = pull(i, {j}, {closing}, r2{square}, d, p)")
         lines += [line.format(n=n) for line in also]

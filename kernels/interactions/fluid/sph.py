@@ -15,7 +15,6 @@ by P/n^2. Only laws ask for masses and densities as they are, by the ``share`` m
 """
 
 import functools
-from collections.abc import Mapping
 from typing import Any
 
 import warp as wp
@@ -189,52 +188,6 @@ def force_term(
         return t[0] * x_ij + t[1] * aside + dragged(i, j, r2, d, p) * v_ij
 
     return Term(function(push_and_drag), 3, None, "fused")
-
-
-def heat_term(
-    slope: wp.Function, laws: Mapping[str, wp.Function], switched: bool, dimension: int, kicks: int,
-    precision: Precision, data: Any, params: Any,
-) -> Term:  # fmt: skip
-    """Term m_j (P_i/rho_i^2 + Pi_ij/2) u_ij . grad_i W_ij of heat, at the mean velocities of kicks.
-
-    A drag heats by -w_ij v_ij . u_ij / 2.
-
-    Coincident particles are taken as h apart, as by the force.
-    """
-    real, vec3, result = precision.scalar, precision.vec3, precision.vector(kicks)
-    state_of, vector_of = reader(precision, 4), reader(precision, 3)
-    aside, read = vec3(*DIRECTIONS[dimension]), reader(precision)
-    viscosity, both = laws.get("term"), kicks == 2
-    viscous, drags = viscosity is not None, "drag" in laws
-    dragged = drag_function(slope, laws["drag"], False, precision, data, params) if drags else None
-
-    def warm(i: int, j: int, x_ij: vec3, r2: real, d: data, p: params):
-        apart = r2 > p.closest_squared
-        side = wp.where(d.slot[i] < d.slot[j], -p.smoothing_length, p.smoothing_length)
-        distance2 = wp.where(apart, r2, p.smoothing_length * p.smoothing_length)
-        along = x_ij + wp.where(apart, real(0.0), side) * aside
-        state_i = state_of(d.state, i)
-        state_j = state_of(d.state, j)
-        stress = state_i[2]
-        if wp.static(viscous):
-            v_ij = vector_of(d.v, i) - vector_of(d.v, j)
-            mean = real(0.5) * (state_i + state_j)
-            term = viscosity(wp.dot(v_ij, x_ij), distance2, mean[1], mean[3], p)
-            if wp.static(switched):
-                term *= real(0.5) * (read(d.balsara, i) + read(d.balsara, j))
-            stress += real(0.5) * term
-        gradient = (state_j[0] * p.sigma) * slope(wp.sqrt(distance2) * p.inverse_h)
-        g = (gradient * stress * p.inverse_h) * p.inverse_h * along
-        if wp.static(drags):
-            w_ij = dragged(i, j, r2, d, p)
-            g -= (real(0.5) * w_ij) * (vector_of(d.v, i) - vector_of(d.v, j))
-        rate = result()
-        rate[0] = wp.dot(vector_of(d.u0, i) - vector_of(d.u0, j), g)
-        if wp.static(both):
-            rate[1] = wp.dot(vector_of(d.u1, i) - vector_of(d.u1, j), g)
-        return rate
-
-    return Term(function(warm), kicks)
 
 
 def virial_term(force: Term, precision: Precision, data: Any, params: Any) -> Term:

@@ -25,9 +25,11 @@ class ContactBounce:
 
     def _make_room(self) -> None:
         """As many entries as the rows have now."""
-        lam = self.contact.touching.struct.lam
-        self.generation = self.contact.touching.generation
-        self.push, self.more = wp.zeros_like(lam), wp.zeros_like(lam)
+        touching, real = self.contact.touching, self.model.precision.scalar
+        self.generation, entries = touching.generation, len(touching.struct.entry)
+        self.push, self.more = (
+            wp.zeros(entries, dtype=real, device=self.model.device) for _ in range(2)
+        )
 
     def start(self, bounces: Any) -> None:
         """What the projection has made of velocities of pairs that bounce is taken back."""

@@ -15,7 +15,9 @@ from ...engine.model import Model
 from ...engine.state import State
 from ...kernels.engine.loops import Term
 from ...kernels.interactions.fluid import heat as kernels
+from ...kernels.interactions.fluid import heat_images as of_images
 from ..pair_loop import PairLoop
+from .walls import Pass
 
 ENERGY = "internal_energy"  # the attribute, per mass [length^2/time^2]
 
@@ -51,8 +53,10 @@ class Heat:
     the second are kept until the next substep, which begins with it, and the pressure is taken at
     a u that is foreseen with them, as velocities are; then u is of second order too.
 
+    Walls work where they move, by what they exert: then the sum changes by that.
+
     Args:
-        fluid: The ``SPH``, attached.
+        fluid: The ``SPH``, attached with its walls.
         term: Makes the term of its rates, of kicks, precision and the structs of data and
             parameters.
     """
@@ -69,6 +73,7 @@ class Heat:
         fields = {**fluid.fields, **{f"u{k}": each for k, each in enumerate(self.means)}}
         self.loop = PairLoop.over(model, self.pairs, "Heat", fields, fluid.Params, fluid.params)
         self.term: Term = term(self.kicks, precision, self.loop.Data, fluid.Params)
+        self.walls = HeatBesideWalls(self, fluid) if fluid.walls else None
         self.error = wp.zeros_like(self.rates[0]) if model.settings.compensated else None
         self.kernels = kernels.heat_kernels(precision, self.error is not None)
 
@@ -113,4 +118,52 @@ class Heat:
             inputs = [self.pairs.order, *moving, dt, mean]
             launch(self.kernels.mean_velocity, self.pairs.count, inputs, device)
         out = {f"rate{k}": each for k, each in enumerate(self.rates)}
-        self.loop.sum(self.term, functools.partial(kernels.keep_rates, self.kicks), out)
+        store = functools.partial(kernels.keep_rates, self.kicks, None)
+        if self.walls is None:
+            self.loop.sum(self.term, store, out)
+        else:
+            self.walls.sum(Pass(self.loop, self.term, store, out))
+
+
+class HeatBesideWalls:
+    """The same over images in walls, which work where they move.
+
+    Args:
+        heat: That of the fluid. fluid: The ``SPH``, attached, with walls.
+    """
+
+    def __init__(self, heat: Heat, fluid: Any):
+        model, pairs, walls = fluid.model, fluid.pairs, fluid.walls
+        self.model, self.pairs, self.held, self.means = model, pairs, walls, heat.means
+        precision, kicks = model.precision, heat.kicks
+        each, vec3, carried = precision.vector(walls.total), precision.vec3, len(walls.against)
+        self.closing = [pairs.array(each) for _ in range(kicks)]
+        none = wp.empty(0, dtype=vec3, device=model.device)
+        self.against = [pairs.array(vec3) if carried else none for _ in range(kicks)]
+        fields = {**walls.fields}
+        for k in range(kicks):
+            fields |= {f"u{k}": self.means[k], f"closing{k}": self.closing[k]}
+            if carried:
+                fields[f"against{k}"] = self.against[k]
+        given = model, pairs, "HeatBesideWalls", fields, fluid.Params, fluid.params
+        self.loop = PairLoop.over(*given)
+        types, drags = self.loop.types, "drag" in fluid.laws
+        heating = kernels.heating_function(
+            fluid.slope, fluid.laws, fluid.switch is not None, *types
+        )
+        warm = kernels.warm_function(heating, drags, fluid.dimension, kicks, *types)
+        images = heating, drags, kicks
+        self.terms = [of_images.heat_term(warm, *images, seen, *types) for seen in walls.ways]
+        owns = [of_images.own_heat(*images, seen, *types) for seen in walls.ways]
+        self.stores = [functools.partial(kernels.keep_rates, kicks, own) for own in owns]
+        self.kernel = of_images.mean_rate_kernel(precision, walls.total)
+
+    def sum(self, plain: Pass) -> None:
+        """The pass of heat, of which ``plain`` is that far from walls."""
+        v, device = self.pairs.fields["velocity"], self.model.device
+        for k, mean in enumerate(self.means):
+            inputs = [self.pairs.pairs, v, mean, self.held.struct]
+            written = [self.closing[k], self.against[k]]
+            launch(self.kernel, self.pairs.count, [*inputs, *written], device)
+        both = zip(self.terms, self.stores, strict=True)
+        self.held.sum(plain, *(Pass(self.loop, term, store, plain.out) for term, store in both))

@@ -15,6 +15,7 @@ from ...engine.neighbors.verlet import VerletList
 from ...engine.probe import Probe
 from ...engine.state import State
 from ...kernels.interactions.fluid import continuity as of_continuity
+from ...kernels.interactions.fluid import heat as of_heat
 from ...kernels.interactions.fluid import images
 from ...kernels.interactions.fluid import lengths as of_lengths
 from ...kernels.interactions.fluid import sph as kernels
@@ -50,7 +51,7 @@ class Passes(Evolving):
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
         columns = self.columns(self.parameters)
-        read = {"velocity": self.moving or self.density is not None, ENERGY: self.hot}
+        read = {"velocity": self.moving or self.density is not None or self.hot, ENERGY: self.hot}
         names = {"mass"} | {name for name, on in read.items() if on}
         if self.adaptive is None:
             self.pairs = cast(VerletList, neighbors.of(self, names))  # as there is a cutoff
@@ -90,7 +91,7 @@ class Passes(Evolving):
         # Mass, density, P / rho^2 and sound speed of each slot, together as they are read together.
         self.slot_state = self.pairs.array(precision.vector(4))
         fields = {"x": held["position"], "state": self.slot_state, **self.fluids.read(held["mass"])}
-        if self.moving or self.continuity is not None:
+        if self.moving or self.continuity is not None or self.hot:
             fields["v"] = held["velocity"]
         if self.continuity is not None:
             fields |= self.continuity.attach(state)
@@ -112,23 +113,23 @@ class Passes(Evolving):
         self._make_terms()
         if self.walls:
             self.walls.attach(state, fields)
+        if self.hot:
+            self.heat = Heat(self, state, self.heat_term)
 
     def _make_terms(self) -> None:
         self._types = types = self.loop.types
         if self.lengths is not None:
             viscous = self.slope, self.laws.get("term"), self.dimension
-            heat = functools.partial(of_lengths.heat_term, *viscous)
+            self.heat_term = functools.partial(of_lengths.heat_term, *viscous)
             self.force_term = of_lengths.force_term(*viscous, *types)
         else:
             given = self.slope, self.laws, self.switch is not None, self.dimension
-            heat = functools.partial(kernels.heat_term, *given)
+            self.heat_term = functools.partial(of_heat.heat_term, *given)
             self.density_term = kernels.density_term(self.weight, *types)
             if self.continuity is not None:
                 self.continuity.over(self.loop, self.slope, self.laws)
             pull, dragged = self.pull(*types), self.dragged(*types)
             self.force_term = kernels.force_term(pull, dragged, self.moving, self.dimension, *types)
-        if self.hot:
-            self.heat = Heat(self, self.state, heat)
         if self.lengths is not None:
             self.lengths.over(self.loop, self.weight, self.slope)
             self.lengths.start()

@@ -58,8 +58,8 @@ class SPH(Passes):
     the rest density.
 
     Boundaries that hold the fluid are mirrors of it: images of its particles hold it up, and let
-    it slip or stick (:class:`~particlesim.interactions.fluid.walls.Walls`). One with heat, or with
-    lengths of its particles' own, is held by their radius alone.
+    it slip or stick (:class:`~particlesim.interactions.fluid.walls.Walls`); a wall that moves works
+    on a gas as a piston does. One with lengths of its particles' own is held by their radius alone.
 
     A run warns of a start whose masses do not make the rest density at their spacing, whose
     particles overlap or lie behind walls that hold them, whose smoothing length is below the

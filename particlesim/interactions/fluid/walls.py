@@ -45,8 +45,8 @@ class Walls:
     most by a spacing, and comes back slowly, as overlaps of contacts do: a tank that is no whole
     number of spacings wide does not burst.
 
-    A fluid whose heat or smoothing lengths are its particles' own sees none: boundaries hold such
-    particles by their radius alone.
+    A fluid whose smoothing lengths are its particles' own sees none: boundaries hold such particles
+    by their radius alone.
 
     Sides of boundaries take places: the three axes of a box one each, every other boundary one. Of
     more than four places walls share the last, and there a particle sees the nearest.
@@ -59,8 +59,9 @@ class Walls:
     def __init__(self, fluid: Any, model: Model):
         self.fluid, self.model = fluid, model
         kinds = zip(*(scene.constraints for scene in model.scenes), strict=True)
-        mirrored = fluid.adaptive is None and not fluid.hot
-        bound = [peers[0].bind(peers) for peers in kinds if peers[0].solid and mirrored]
+        bound = [
+            peers[0].bind(peers) for peers in kinds if peers[0].solid and fluid.adaptive is None
+        ]
         held = [(part, _held(model, fluid, part)) for part in bound]
         self.held = [(part, flags) for part, flags in held if flags.any()]
         peers = [peer for part, _ in self.held for peer in part.peers]
@@ -102,8 +103,9 @@ class Walls:
         sides = [len(wall.places) for wall in self.walls]
         self.stride, self.begins = sum(sides), np.cumsum([0, *sides])[:-1].tolist()
         self.easing = Easing(model, model.world_count * self.stride, wp.float32, ends=1)
-        # By continuity the density answers to a wall that comes back.
-        count = 0 if self.fluid.continuity is None else len(self.easing.slack)
+        # Density by continuity and heat answer to a wall that comes back.
+        answers = self.fluid.continuity is not None or self.fluid.hot
+        count = len(self.easing.slack) if answers else 0
         self.closing = wp.zeros(count, dtype=wp.float32, device=model.device)
         self.rest = model.array(0.5 * self.fluid.spacings, precision.scalar)
         self._make_terms(fields)
@@ -130,7 +132,7 @@ class Walls:
 
     def _make_terms(self, fields: Mapping[str, wp.array]) -> None:
         model, fluid = self.model, self.fluid
-        beside = {**fields, "wall": self.distance}
+        self.fields = beside = {**fields, "wall": self.distance}
         if self.rate is not None:
             beside["rate"] = self.rate
         if len(self.against):
