@@ -25,10 +25,11 @@ def test_the_ready_scenes_are_all_there():
     expected = (
         "balloon bouncing_block cantilever catenary chain cloth_drape dam_break elastic_rings "
         "elliptical_drop floating_block freezing galaxy_collision gas_in_a_box hydrostatic_tank "
-        "lj_melt molten_salt newtons_cradle phase_transition pile plummer_sphere poiseuille "
-        "polymer_melt polytrope rain_on_cloth rigid_stack rising_bubble rope_bridge sand_column "
-        "sedov_blast sloshing_tank sod_tube spring_lattice standing_wave star_collision "
-        "taylor_green three_body toy_star triple_pendulum wave_field wrecking_ball"
+        "jelly_stack lj_melt molten_salt newtons_cradle phase_transition pile plummer_sphere "
+        "poiseuille polymer_melt polytrope rain_on_cloth rigid_stack rising_bubble "
+        "rope_bridge sand_column sedov_blast sloshing_tank sod_tube spring_lattice "
+        "standing_wave star_collision taylor_green three_body toy_star triple_pendulum "
+        "wave_field wrecking_ball"
     )
     assert set(expected.split()) <= set(NAMES)
 

@@ -28,6 +28,7 @@ class Solved:
     item: Any  # struct of a tuple's parameters
     relative: bool  # evaluated at positions seen from the tuple's first particle
     unit: bool  # the gradients have unit length
+    carried: bool  # where that at the start does not exist it is the present one, carried back
     # What some tuple of some world asks for; what none does is not compiled.
     damped: bool
     one_sided: bool

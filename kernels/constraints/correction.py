@@ -4,7 +4,7 @@ import functools
 
 import warp as wp
 
-from ..precision import function
+from ..precision import Precision, function
 from .constraints import Solved, bodies_type, positions_type, seen_function
 
 TURNED = 0.5  # of the gradient: what is left of it along that at the start of the substep
@@ -37,6 +37,59 @@ def load_function(law: Solved) -> wp.Function:
 
 
 @functools.cache
+def carry_function(precision: Precision) -> wp.Function:
+    """``carry(X, Y, G) -> H``: a gradient of four particles at X, carried to where they were at Y.
+
+    H_a = F G_a of the linear map F that takes the edges of X to those of Y. With G_a = E S b_a, E
+    the edges of X and S symmetric, as of any C that turning does not change, H_a = F E S b_a has no
+    moment at Y either.
+    """
+    real, positions = precision.scalar, positions_type(precision, 4)
+
+    def carry(X: positions, Y: positions, G: positions):
+        u, v, w = X[1] - X[0], X[2] - X[0], X[3] - X[0]
+        vw, wu, uv = wp.cross(v, w), wp.cross(w, u), wp.cross(u, v)
+        share = real(1.0) / wp.dot(u, vw)
+        H = positions()
+        for a in range(4):
+            g = G[a] * share
+            H[a] = (
+                (Y[1] - Y[0]) * wp.dot(vw, g)
+                + (Y[2] - Y[0]) * wp.dot(wu, g)
+                + (Y[3] - Y[0]) * wp.dot(uv, g)
+            )
+        return H
+
+    return function(carry)
+
+
+@functools.cache
+def alike_function(precision: Precision) -> wp.Function:
+    """``alike(H, K, G) -> H``, or K where H is not about G; number by number.
+
+    That at the start, which stays as it is in all sweeps of a substep, is the better one.
+    """
+    real, positions = precision.scalar, positions_type(precision, 4)
+
+    def alike(H: positions, K: positions, G: positions):
+        own = real(0.0)
+        other = real(0.0)
+        both = real(0.0)
+        for a in range(4):
+            own += wp.length_sq(G[a])
+            other += wp.length_sq(H[a])
+            both += wp.dot(G[a], H[a])
+        about = wp.where(both >= real(0.9) * own, other <= real(1.25) * own, False)
+        D = positions()
+        for a in range(4):
+            for k in range(3):
+                D[a, k] = wp.where(about, H[a, k], K[a, k])
+        return D
+
+    return function(alike)
+
+
+@functools.cache
 def evaluate_function(law: Solved) -> wp.Function:
     """``evaluate(x, e, c, v, q, B, dt) -> (C, G, H, extent)``: what a law makes of a tuple.
 
@@ -46,7 +99,8 @@ def evaluate_function(law: Solved) -> wp.Function:
     """
     positions, Box, item = positions_type(law.precision, law.size), law.types[1], law.item
     law_of, seen, real = law.evaluate, seen_function(law), law.precision.scalar
-    size, relative = law.size, law.relative
+    size, relative, carried = law.size, law.relative, law.carried
+    carry, alike = carry_function(law.precision), alike_function(law.precision)
 
     def evaluate_seen(
         x: positions, e: positions, c: positions, v: positions, q: item, B: Box, dt: real
@@ -65,6 +119,8 @@ def evaluate_function(law: Solved) -> wp.Function:
                 for a in range(wp.static(size)):
                     Y[a] = Y[a] - first
             _C, H = law_of(Y, q)
+            if wp.static(carried):
+                H = alike(H, carry(X, Y, G), G)
             for a in range(1, wp.static(size)):
                 extent += wp.length_sq(Y[a] - Y[0])
             extent = wp.sqrt(extent)

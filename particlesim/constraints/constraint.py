@@ -80,6 +80,7 @@ class Constraint(ReadTuples):
 
     relative = False  # the evaluation takes positions from the first particle's
     unit = False  # its gradients have unit length
+    carried = False  # of four: one that the start lacks is the present one, carried back
 
     def __init__(
         self, law: Any, particles: Any, *, compliance: Any = 0.0, damping: Any = 0.0,

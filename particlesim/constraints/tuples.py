@@ -81,7 +81,7 @@ class Tuples:
         return Solved(
             constraint.evaluation(model, self.Item), model.precision, model.periodic,
             "position_error" in state, self.size, self.Item, constraint.relative, constraint.unit,
-            self.damped, self.one_sided, self.breakable,
+            constraint.carried, self.damped, self.one_sided, self.breakable,
         )  # fmt: skip
 
     @functools.cached_property

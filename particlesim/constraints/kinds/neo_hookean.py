@@ -68,6 +68,7 @@ class NeoHookean(Constraint):
     """
 
     relative = True
+    carried = True  # where it is at rest its strain has no gradient
 
     def __init__(
         self, tetrahedra: Any, youngs_modulus: Any, poissons_ratio: Any, *, damping: Any = 0.0

@@ -97,3 +97,15 @@ def test_a_balloon_has_the_pressure_of_its_tension(device):
     post, cord = sim.scenes[0]["string"].indices[[0, -1]]
     way = sim.position[cord] - sim.position[post]
     assert way[1] > 0.99 * np.linalg.norm(way)
+
+
+@pytest.mark.slow
+def test_jelly_stands_below_the_height_at_which_it_buckles(device):
+    module, sim = simulate("jelly_stack", 180, device, cubes=3, spacing=0.075)
+    # A column of E = 3e5 Pa and a square of 0.3 m buckles under its own weight at a height of
+    # (7.84 E I / rho g A)^(1/3) = 1.2 m (Greenhill 1881): three cubes of 0.9 m come to rest, in
+    # the order and near the places in which they fell.
+    assert np.linalg.norm(sim.velocity, axis=1).max() < 0.01
+    middles = sim.position.reshape(3, -1, 3).mean(axis=1)
+    assert np.abs(middles[:, [0, 2]]).max() < 0.1 * module.SIDE
+    assert (np.diff(middles[:, 1]) > 0.9 * module.SIDE).all()
