@@ -126,3 +126,34 @@ def test_a_shock_before_a_piston_and_from_the_end_of_its_tube():
     assert rho[fresh].mean() == pytest.approx(8 / 3, rel=0.03)
     work = 4.5 * p * speed * sim.time
     assert sim.diagnostics().energy[0] - start == pytest.approx(work, rel=0.01)
+
+
+def test_a_wall_that_drags_a_gas_along_heats_it():
+    """Couette: nu rho V^2 / d an area and a time, which is the work of the wall that moves."""
+    count, speed, nu, time = 12, 0.3, 0.1, 0.4
+    spacing = 1 / count
+    width = 8 * spacing
+    scene = ps.Scene(periodic=((0, None, None), (width, None, None)))
+    x = ps.sample.box((0, 0, 0), (width, 1, 0), spacing)
+    gas = scene.add_particles(
+        x, velocity=speed * x[:, 1:2] * NORMAL, mass=spacing**2, radius=1e-6, internal_energy=2.0
+    )
+    scene.add_interaction(
+        ps.SPH(gas, smoothing_length=2 * spacing, dimension=2, viscosity=ps.LaminarViscosity(nu),
+               equation_of_state=ps.IdealGas(GAMMA))
+    )  # fmt: skip
+    scene.add_constraint(ps.PlaneBoundary((0, 0, 0), (0, 1, 0), slip=False))
+    upper = (np.inf, 1, np.inf)  # a side that moves along itself
+    wall = scene.add_constraint(
+        ps.BoxBoundary((-np.inf,) * 3, upper, velocity=speed * NORMAL, slip=False)
+    )
+    settings = ps.Settings(dt=0.01, substeps=8, precision="float64")
+    sim = ps.Simulation(scene, settings, device="cpu")
+    start, force = sim.diagnostics().energy[0], [sim.force(wall)[0]]
+    for _ in range(round(time / settings.dt)):
+        sim.step()
+        force.append(sim.force(wall)[0])
+    gained = sim.diagnostics().energy[0] - start
+    assert gained == pytest.approx(nu * speed**2 * width * time, rel=0.01)
+    # The sum of trapezes of a force that stays within 1 %, and is sampled 40 times.
+    assert gained == pytest.approx(-speed * np.trapezoid(force, dx=settings.dt), rel=1e-3)
