@@ -39,7 +39,7 @@ def zero_kernel(dtype: Any, block: int = 1) -> wp.Kernel:
 
     def zero_natively(first: int, last: int, target: wp.array(dtype=dtype)): ...
 
-    number = not hasattr(dtype, "_wp_scalar_type_")  # else a vector, a matrix
+    number = dtype in (wp.float32, wp.float64, wp.int32, wp.int64)  # else a vector, a struct
     snippet = f"__builtin_memset({_bytes('target', dtype)}, 0, {_size(dtype)});"
     zero = native(zero_natively, snippet, False)
 
