@@ -54,11 +54,9 @@ def test_a_chain_converges_with_both(device):
 
 @pytest.mark.slow
 def test_a_cantilever_converges_to_its_links(device):
-    found = errors(
-        cantilever.build, cantilever.error, 180, [20, 100, 400], [1, 4, 16], device
-    )  # fmt: skip
+    found = errors(cantilever.build, cantilever.error, 180, [20, 100, 400], [1, 4, 16], device)
     # n links sum curvatures by the trapezoidal rule: 1 / n^2 of the sag by its own weight, half as
-    # much of that by the load, 0.7 % at most, less what slopes shorten the lever (see test_xpbd).
+    # much of that by the load, 0.7 % at most, less by the slopes (see test_body_scenes).
     assert found[-1] == pytest.approx(found[-1, -1] * np.ones(3), rel=1e-2)
     assert found.max(axis=1)[-1] < 0.007
     assert (np.diff(found, axis=0) < 1e-6).all() and (np.diff(found, axis=1) < 1e-6).all()
