@@ -115,6 +115,7 @@ def test_every_case_says_what_it_is():
 
 ALIKE = {"cloth_10", "grains_200k", "lennard_jones_256k"}  # others' work, in other numbers
 LONG = {
+    "worlds",
     "triple_pendulum",
     "cloth",
     "cost",

@@ -60,7 +60,9 @@ def mix(seed, count=200, side=1.0, speed=2.0):
 
 
 @pytest.mark.parametrize("motion", [{}, {"velocity": (0.5, 0.3, 0), "angular_velocity": (1, 2, 3)}])
-@pytest.mark.parametrize("kind", ["plane", "bowl", "hill"])
+@pytest.mark.parametrize(
+    "kind", ["bowl", *(pytest.param(k, marks=pytest.mark.slow) for k in ("plane", "hill"))]
+)
 def test_laws_equal_the_ready_ones(kind, motion, precision, device, simulate, scene_of):
     """To round-off: friction, bounces, starts outside, at rest and in motion."""
     touch = {"friction": 0.4, "restitution": 0.6, **motion}

@@ -18,7 +18,7 @@ def thrown(links):
     return scene
 
 
-@pytest.mark.parametrize("substeps", [1, 30])
+@pytest.mark.parametrize("substeps", [1, pytest.param(30, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("solver", ["gauss_seidel", "jacobi"])
 @pytest.mark.parametrize("options", [{}, {"compliance": 1e-3, "damping": 10.0}])
 def test_a_thrown_box_keeps_its_momenta(options, solver, substeps, precision, device, simulate):

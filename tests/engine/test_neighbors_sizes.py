@@ -70,6 +70,7 @@ def test_all_pairs_that_touch_are_found(count, box, skin, loops):
         assert (r[i, row] <= limit).all()
 
 
+@pytest.mark.slow
 def test_a_large_one_is_nobody_elses_business():
     """Rows are as long as without it, and only its own is long where it lies among the small."""
     x = ps.sample.box((0, 0, 0), (1, 1, 1), 0.05)

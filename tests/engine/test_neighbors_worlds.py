@@ -104,7 +104,7 @@ CASES = {
 
 ALIKE = {
     "groups", "the first wider than the second", "two cutoffs, large worlds",
-    "two cutoffs, small worlds", "fluid and a force",
+    "two cutoffs, small worlds", "fluid and a force", "three cutoffs",
 }  # fmt: skip
 
 

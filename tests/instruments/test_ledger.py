@@ -136,7 +136,13 @@ def test_a_bounce_takes_its_share(restitution, device):
 # Balances -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", swept())
+LATE = [pytest.mark.slow]  # of the dearest, whose gas goes by what others go by
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(*k.values, marks=[*k.marks, *LATE * ("sod_tube" in k.values)]) for k in swept()],
+)
 def test_every_ready_scene_closes(name, device):
     module, scene = small(name)
     settings = module.settings.replace(ledger=True, substeps=min(module.settings.substeps, 100))

@@ -39,7 +39,9 @@ def salt(seed=0, count=60, box=(6.0, 7.0, 8.0), method="ewald", **options):
     return scene
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    "method", [pytest.param(k, marks=[pytest.mark.slow] * (k == "ewald")) for k in METHODS]
+)
 @pytest.mark.parametrize(("kind", "constant"), [("NaCl", NACL), ("CsCl", CSCL)])
 def test_the_constants_of_madelung(kind, constant, method, device):
     """To 1e-6 at the default tolerance. By symmetry no force is more than rounding of 1e3 terms,

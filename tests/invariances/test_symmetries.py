@@ -169,7 +169,16 @@ def test_order_of_constraints(pair):
     assert np.abs(first - second).max() < 0.02 * np.abs(first - particles()[0]).max()
 
 
-@pytest.mark.parametrize("pair", itertools.product(APART, HOLDING), ids="-".join)
+LATE = {("SPH", "BoxBoundary"), ("SPH", "Boundary")}  # as with a plane
+
+
+@pytest.mark.parametrize(
+    "pair",
+    [
+        pytest.param(each, marks=[pytest.mark.slow] * (each in LATE), id="-".join(each))
+        for each in itertools.product(APART, HOLDING)
+    ],
+)
 def test_forces_and_constraints_have_lists_of_their_own(pair):
     """It does not matter which of a force and a constraint was added first: the same bits."""
     first, second = (run(scene(names), frames=2) for names in (pair, pair[::-1]))

@@ -60,7 +60,8 @@ def channel_error(across, dragged):
     return max(errors[k - 1] for k in MIDDLE[dragged])
 
 
-@pytest.mark.parametrize("dragged", [pytest.param(False, marks=slow), True])
+@slow
+@pytest.mark.parametrize("dragged", [False, True])
 def test_flow_between_plates(dragged):
     """Of a parabola the laplacian of what is smoothed is exact but within 3 h of the plates,
 

@@ -6,6 +6,7 @@ import pytest
 import particlesim as ps
 
 
+@pytest.mark.slow
 def test_tank_at_rest():
     """p = rho g (H - y), the column keeps its height, and it comes to rest.
 

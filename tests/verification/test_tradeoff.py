@@ -220,6 +220,7 @@ def hanging_chain(links=20):
     return scene
 
 
+@pytest.mark.slow
 def test_a_chain_comes_to_the_catenary_with_its_links(device):
     # Drag of 8 m / s, of which half damps: in 5 s what the start lacks is down to e^-20 of it.
     table = ps.tradeoff(

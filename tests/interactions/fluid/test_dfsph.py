@@ -79,6 +79,7 @@ def test_rates_are_those_of_densities(kind):
 
 
 @pytest.mark.parametrize("kind", WALLS)
+@pytest.mark.slow
 def test_answers_are_symmetric(kind):
     """Sum m l (A k) is that with k and l exchanged, and A has the diagonal that it is told."""
     fluid = bound(simulation(water(kind)))

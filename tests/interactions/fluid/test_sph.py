@@ -57,6 +57,7 @@ def test_momentum_and_angular_momentum_are_conserved(precision, device, cloud, f
     assert np.abs(after.momentum - before.momentum).max() > 0  # something has happened
 
 
+@pytest.mark.slow
 def test_viscosity_takes_energy_out(cloud, fluid):
     x, v, m = cloud()
     box = ((0, 0, 0), SIDE)

@@ -107,7 +107,8 @@ def test_only_the_group_feels_it_and_pinned_particles_push(cloud, prepared):
     assert np.all(sim.position[wall.slice] == x[wall.slice])
 
 
-@pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", ["float64", "float32"])
 def test_plain_loop_equals_the_vectorised_one(precision, monkeypatch, cloud, fluid, prepared):
     """The loop in Warp's own language is the reference of the native one."""
     x, v, m = cloud()

@@ -203,6 +203,7 @@ def test_a_piston_does_work_on_a_gas():
     assert work == pytest.approx(gained, rel=0.02)  # sampled once a frame, with sound in it
 
 
+@pytest.mark.slow
 def test_bits(tmp_path, device):
     """Threads, batches, resets and restarts, with a start in the walls and one that moves."""
 
