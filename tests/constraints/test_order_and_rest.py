@@ -84,6 +84,7 @@ def test_rest_does_not_know_of_damping(damping, device):
     assert lengths[1] == pytest.approx(lengths[0], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_damping_is_that_of_a_damper(device, simulate):
     """A pair with a spring k and a damper beta: x'' = -(k x + beta x') / mu, mu = m / 2.
 

@@ -85,6 +85,7 @@ def test_the_force_is_the_tension(precision, device):
     assert np.abs(sim.ledger().unaccounted).max() < (1e-3 if precision == "float32" else 1e-11)
 
 
+@pytest.mark.slow
 def test_what_else_there_is_goes_with_verlet(device):
     """A block falls onto a floor, rubs and comes to rest; contacts, ropes and dampers take part."""
     scene = ps.Scene()

@@ -104,7 +104,7 @@ CASES = {
 
 ALIKE = {
     "groups", "the first wider than the second", "two cutoffs, large worlds",
-    "two cutoffs, small worlds", "fluid and a force", "three cutoffs",
+    "two cutoffs, small worlds", "fluid and a force", "three cutoffs", "an empty world",
 }  # fmt: skip
 
 

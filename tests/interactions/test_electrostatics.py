@@ -59,6 +59,7 @@ def test_the_constants_of_madelung(kind, constant, method, device):
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.slow
 def test_the_crystal_of_wigner(method, device):
     """Charges of one sign in a uniform background, bcc: U / N = -0.895929255682 q^2 / a (Foldy
     1978), a the radius of a sphere of volume V / N. The background counts in full.

@@ -169,7 +169,7 @@ def test_order_of_constraints(pair):
     assert np.abs(first - second).max() < 0.02 * np.abs(first - particles()[0]).max()
 
 
-LATE = {("SPH", "BoxBoundary"), ("SPH", "Boundary")}  # as with a plane
+LATE = {("SPH", "BoxBoundary"), ("SPH", "Boundary"), ("SPH", "PlaneBoundary")}  # as others
 
 
 @pytest.mark.parametrize(

@@ -103,6 +103,7 @@ def test_answers_are_symmetric(kind):
         assert diagonal[i] == pytest.approx(own, rel=0.6 if beside else 1e-9)
 
 
+@pytest.mark.slow
 def test_pressures_that_were_found_fit():
     """None pulls; where there is one density comes to rest, elsewhere it stays below."""
     tight = {"density_tolerance": 1e-9, "divergence_tolerance": 1e-9, "pressure_iterations": 2000}

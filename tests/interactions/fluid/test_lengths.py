@@ -13,6 +13,7 @@ from particlesim.engine.model import Model
 
 @pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("periodic", [None, pytest.param(BOX, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_sums_are_those_of_all_pairs_wherever_particles_go(precision, periodic):
     """At the start, and when they have moved by several lengths, so that lists had to follow."""
     scene = cloud(700, periodic=periodic)

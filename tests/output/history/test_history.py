@@ -178,6 +178,7 @@ def test_a_history_does_not_touch_the_run(tmp_path, liquid, integrator):
     np.testing.assert_array_equal(plain.velocity, watched.velocity)
 
 
+@pytest.mark.slow
 def test_density_stays_that_of_the_last_forces(tmp_path):
     plain, watched = (ps.Simulation(fluid(), device="cpu") for _ in range(2))
     plain.run(2)
