@@ -52,6 +52,7 @@ def test_where_all_are_disturbed_it_is_the_time_of_the_processor():
     assert undisturbed(own, own) == pytest.approx((2 + 1, 6))
 
 
+@pytest.mark.slow
 def test_a_row_is_measured_for_long_enough():
     table = ps.tradeoff(
         harmonic, {"substeps": [1]}, frames=24, settings=two_turns(), repeats=2, device="cpu",

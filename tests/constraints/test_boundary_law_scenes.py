@@ -80,6 +80,7 @@ def test_a_world_in_a_batch_equals_it_alone(precision, device, simulate, scene_o
     equal_alone(simulate, [stirred(k, scene_of) for k in range(3)], device, 40, **knobs)
 
 
+@pytest.mark.slow
 def test_reset_and_checkpoint(tmp_path, device, simulate, scene_of):
     """A world that is reset goes as at first; a run that was saved goes on, bit for bit."""
     scenes = [stirred(k, scene_of) for k in range(1, 3)]

@@ -55,6 +55,7 @@ def motion(sim, frames=6):
 
 
 @pytest.mark.parametrize("execution", ["graph", "threads"])
+@pytest.mark.slow
 def test_two_threads_give_the_bits_of_one_after_the_other(liquid, execution):
     alone = [motion(make(liquid, seed, execution)) for seed in (1, 2)]
     sims = [make(liquid, seed, execution) for seed in (1, 2)]

@@ -64,6 +64,7 @@ def test_images_heat_as_particles_behind_the_walls_would():
     "slips",
     [(False,), *(pytest.param(each, marks=LONG) for each in ((True, True), (False, True)))],
 )
+@pytest.mark.slow
 def test_first_law_beside_walls(slips, integrator):
     """Kinetic and internal energy are one sum, to round-off, also in corners and where it sticks.
 

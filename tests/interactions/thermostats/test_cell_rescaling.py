@@ -37,6 +37,7 @@ def scenes():
     return [liquid(1), liquid(2, pressure=5.0), liquid(3, cells=6)]
 
 
+@pytest.mark.slow
 def test_the_same_bits_in_a_batch_or_alone(scenes):
     together = equal_alone(simulate, scenes, "cpu", 5)
     assert (np.abs(together.diagnostics().volume / [154.3, 154.3, 1234.3] - 1) > 0.003).all()
