@@ -60,7 +60,6 @@ def touching_type(precision: Precision) -> Any:
         "most": wp.array(dtype=wp.int32),  # in any substep since there was last made room
         "overflow": wp.array(dtype=wp.int32),  # one: some row was full
         # By world.
-        "hit": wp.array(dtype=wp.int32),  # something bounces in this substep
         "running": wp.array(dtype=wp.int32),  # to be swept again
         "unsettled": wp.array(dtype=wp.int32),  # some pair is still short of its distance
         "entry": wp.array(dtype=entry_type(precision)),  # the rows

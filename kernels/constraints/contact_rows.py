@@ -227,24 +227,3 @@ def push_kernel(precision: Precision, params: Any, compensated: bool) -> wp.Kern
             place(i, b.x[i], kept(i, b), total * w, b)
 
     return push_contacts
-
-
-@functools.cache
-def decide_kernel(precision: Precision) -> wp.Kernel:
-    """Kernel, by world: whether to sweep again, ``most`` times at most."""
-    Touching = touching_type(precision)
-
-    @register
-    def decide_contacts(
-        first: int, most: int, t: Touching, sweeps_io: wp.array(dtype=wp.int32),
-        flag_out: wp.array(dtype=wp.int32),
-    ):  # fmt: skip
-        w = first + wp.tid()
-        sweeps_io[w] = sweeps_io[w] + 1
-        if t.unsettled[w] == 0 or t.hit[w] == 0 or sweeps_io[w] >= most:
-            t.running[w] = 0
-        t.unsettled[w] = 0
-        if t.running[w] != 0:
-            flag_out[0] = 1
-
-    return decide_contacts

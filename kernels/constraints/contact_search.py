@@ -115,7 +115,6 @@ def find_kernel(precision: Precision, periodic: Periodicity, params: Any) -> wp.
                     e.n = n
                     if bounces and -wp.dot(n, v) * dt > calm:
                         e.rise = -p.restitution * wp.dot(n, v) * dt
-                        t_out.hit[w] = 1
                         stir = wp.max(stir, -wp.dot(n, v) * dt)
                     t_out.entry[at] = e
                 found += 1

@@ -222,13 +222,13 @@ class Constraint(ReadTuples):
         if self.count:
             self.solver.go_on(count, omega)
 
-    def look(self, flag: wp.array, tolerance: float, dt: float) -> None:
+    def look(self, flag: wp.array, tolerance: float) -> None:
         if self.count:
             self.solver.look(flag, tolerance)
 
-    def start_bounce(self, state: State, neighbors: Neighbors, bounces: Any, dt: float) -> None:
+    def prepare_bounce(self, state: State, neighbors: Neighbors, bounces: Any, dt: float) -> None:
         if self.count:
-            self.velocities.start_bounce()
+            self.velocities.prepare_bounce()
 
     def bounce(self, state: State, neighbors: Neighbors, bounces: Any, dt: float) -> None:
         if self.count:

@@ -21,6 +21,7 @@ from ..engine.state import State
 from ..kernels.constraints import contact as kernels
 from ..kernels.constraints import contact_rows as rows
 from ..kernels.constraints.contact_search import find_kernel
+from ..kernels.engine.bounces import decide_kernel
 from .easing import EasedConstraint
 from .limits import contact_limits
 from .solving.contact_bounce import ContactBounce
@@ -202,7 +203,6 @@ class Contact(EasedConstraint):
             self.bodies, self.force, self.radius, self.easing.slack, moving, dt, moving, touching
         ]  # fmt: skip
         self._launch(self.start_kernel, inputs)
-        call(touching.hit.zero_)
         inputs = [self.model.box, self.params, self.apart, self.bodies, dt, touching]
         self._launch(self.find_kernel, inputs)
 
@@ -230,11 +230,11 @@ class Contact(EasedConstraint):
 
     def _decide(self) -> None:
         """Which worlds are swept again."""
-        model, touching = self.model, self.touching
-        call(touching.flag.zero_)
-        most = model.settings.bounce_iterations
-        inputs = [most, touching.struct, touching.sweeps, touching.flag]
-        launch(rows.decide_kernel(model.precision), model.world_count, inputs, model.device)
+        model, it = self.model, self.touching
+        call(it.flag.zero_)
+        most = model.settings.bounce_iterations - 1  # besides that of the iteration
+        inputs = [most, it.struct.running, it.struct.unsettled, it.sweeps, it.flag]
+        launch(decide_kernel(), model.world_count, inputs, model.device)
 
     @property
     def bounces(self) -> bool:

@@ -24,7 +24,7 @@ class Touching(Rows):
 
     def __init__(self, model: Model, rough: bool):
         precision, count = model.precision, model.particle_count
-        self.model, self.rough, self.generation = model, rough, 0
+        self.model, self.generation = model, 0
         self.struct = struct = touching_type(precision)()
         for name in ("way", "x", "v"):
             setattr(struct, name, self._zeros(count, precision.vec3))
@@ -41,8 +41,7 @@ class Touching(Rows):
         struct.virial = self._zeros(count, wp.float64)
         for name in ("found", "most"):
             setattr(struct, name, self._zeros(count, wp.int32))
-        for name in ("hit", "unsettled"):
-            setattr(struct, name, self._zeros(model.world_count, wp.int32))
+        struct.unsettled = self._zeros(model.world_count, wp.int32)
         struct.running = wp.ones(model.world_count, dtype=wp.int32, device=model.device)
         self.sweeps = self._zeros(model.world_count, wp.int32)
         self.flag = self._zeros(1, wp.int32)

@@ -152,10 +152,30 @@ def steps(model: Model, w: int, index: np.ndarray) -> np.ndarray:
 
 def _ways(model: Model, w: int, index: np.ndarray) -> np.ndarray:
     """From each particle of a tuple to the next, (m, k - 1, 3) [length], to the nearest image."""
-    d = np.diff(model.scenes[w].position[index], axis=1)
-    length = model.box_length[w]
-    wrapped = np.divide(d, length, out=np.zeros_like(d), where=length > 0)
-    return d - length * np.round(wrapped)
+    return nearest(np.diff(model.scenes[w].position[index], axis=1), model.box_length[w])
+
+
+def nearest(d: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Distances (..., 3) to the nearest image, in a box of these lengths, 0 along open axes."""
+    return d - length * np.round(np.divide(d, length, out=np.zeros_like(d), where=length > 0))
+
+
+def listed(
+    rows: np.ndarray, order: np.ndarray, edges: np.ndarray, bound: Any, part: Any
+) -> np.ndarray:
+    """Values of sorted rows, of the worlds of ``part``, in the order in which these list them.
+
+    Args:
+        rows: Row r is of number ``order[r]`` of all worlds'.
+        order: Of the rows.
+        edges: Where the numbers of each world begin, and end.
+        bound: The part of all worlds.
+        part: It, or that of some worlds' scenes.
+    """
+    values = np.empty_like(rows)
+    values[order] = rows
+    mine = [w for w, peer in enumerate(bound.peers) if part is bound or part is peer]
+    return np.concatenate([values[edges[w] : edges[w + 1]] for w in mine])
 
 
 def colors(index: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:

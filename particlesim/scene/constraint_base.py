@@ -72,7 +72,7 @@ class ConstraintBase(Part):
     def go_on(self, count: Any, omega: Any) -> None:
         """Positions went on as ``Settings.acceleration`` says: multipliers do so, too."""
 
-    def look(self, flag: Any, tolerance: float, dt: float) -> None:
+    def look(self, flag: Any, tolerance: float) -> None:
         """Set the flag if something is missed by more than ``Settings.constraint_tolerance``."""
 
     def finish(self, state: Any, neighbors: Any, dt: float) -> None:
@@ -84,12 +84,15 @@ class ConstraintBase(Part):
         return False
 
     def start_bounce(self, state: Any, neighbors: Any, bounces: Any, dt: float) -> None:
-        """The velocities have followed: who bounces off, at what speed?
+        """The velocities have followed: who bounces off, at what speed? Of who ``bounces``.
 
         ``bounces`` is a struct (``kernels.engine.bounces``): velocities ``before`` the sweeps, and
         worlds to be swept ``again``, which whoever is too slow marks. What a projection has made of
         the velocity of who bounces off is taken back: the sweeps give the whole impulse.
         """
+
+    def prepare_bounce(self, state: Any, neighbors: Any, bounces: Any, dt: float) -> None:
+        """Somebody bounces off: the sweeps are about to begin."""
 
     def bounce(self, state: Any, neighbors: Any, bounces: Any, dt: float) -> None:
         """One sweep over the velocities of worlds that are ``running``, by impulses alone.

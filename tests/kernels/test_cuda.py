@@ -66,8 +66,8 @@ def simulate(name, precision):
     bounces = bounces_type(sim.model.precision)()
     with launch.record(launch.Program()):
         for constraint in sim.constraints:
-            constraint.start_bounce(sim.state, sim.neighbors, bounces, 0.01)
-            constraint.bounce(sim.state, sim.neighbors, bounces, 0.01)
+            for step in (constraint.start_bounce, constraint.prepare_bounce, constraint.bounce):
+                step(sim.state, sim.neighbors, bounces, 0.01)
     return sim
 
 

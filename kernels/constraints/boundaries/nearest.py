@@ -7,6 +7,7 @@ the largest radius for which there is room.
 """
 
 import functools
+from types import SimpleNamespace
 from typing import Any
 
 import warp as wp
@@ -16,6 +17,29 @@ from ..boundary_shapes import normals_type
 
 OPPOSITE = -0.9  # cosine of normals, below which two sides face each other
 FAR = 1.0e30  # asks for the distance wherever it is
+
+
+@functools.cache
+def round_functions(precision: Precision) -> SimpleNamespace:
+    """- ``away(y, other)``: the length of y and its direction; where there is none, another one;
+    - ``turned(d, n, inside)``: a distance and a normal, of the inside both the other way.
+    """
+    vec3, real = precision.vec3, precision.scalar
+
+    def away(y: vec3, other: vec3):
+        r = wp.length(y)
+        n = other
+        if r > real(0.0):
+            n = y / r
+        return r, n
+
+    def turned(d: real, n: vec3, inside: int):
+        if inside != 0:
+            n = -n
+            d = -d
+        return d, n
+
+    return SimpleNamespace(away=function(away), turned=function(turned))
 
 
 @functools.cache

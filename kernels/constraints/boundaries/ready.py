@@ -7,6 +7,7 @@ import warp as wp
 
 from ...precision import Precision, function
 from ..boundary_shapes import measure_function
+from .nearest import round_functions
 
 
 @functools.cache
@@ -43,19 +44,13 @@ def plane_near(precision: Precision, params: Any) -> wp.Function:
 @functools.cache
 def sphere_near(precision: Precision, params: Any) -> wp.Function:
     """|x - center| - radius, or from the inside its opposite."""
-    vec3, real = precision.vec3, precision.scalar
+    vec3, real, own = precision.vec3, precision.scalar, round_functions(precision)
+    away, turned = own.away, own.turned
 
     def near_sphere(x: vec3, e: vec3, R: real, s: vec3, p: params):
-        y = x - p.center + e
-        r = wp.length(y)
-        n = vec3(real(0.0), real(1.0), real(0.0))  # of the middle: any direction will do
-        if r > real(0.0):
-            n = y / r
-        d = r - p.radius
-        if p.inside != 0:
-            n = -n
-            d = -d
-        return d, n
+        # Of the middle any direction will do.
+        r, n = away(x - p.center + e, vec3(real(0.0), real(1.0), real(0.0)))
+        return turned(r - p.radius, n, p.inside)
 
     return function(near_sphere)
 

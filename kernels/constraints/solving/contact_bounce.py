@@ -1,6 +1,7 @@
 """Contacts that send bodies off: impulses on the velocities of pairs that have met."""
 
 import functools
+from typing import Any
 
 import warp as wp
 
@@ -11,6 +12,11 @@ from ..constraints import bodies_type
 from ..contact import touching_type
 
 
+def _types(precision: Precision) -> tuple[Any, Any, Any]:
+    """Bodies, rows of who touches, and bounces."""
+    return bodies_type(precision), touching_type(precision), bounces_type(precision)
+
+
 @functools.cache
 def start_kernel(precision: Precision) -> wp.Kernel:
     """Kernel: what the projection has made of velocities of pairs that bounce is taken back.
@@ -19,11 +25,7 @@ def start_kernel(precision: Precision) -> wp.Kernel:
     many times as light as it has such pairs.
     """
     vec3, real = precision.vec3, precision.scalar
-    Bodies, Touching, Bounces = (
-        bodies_type(precision),
-        touching_type(precision),
-        bounces_type(precision),
-    )
+    Bodies, Touching, Bounces = _types(precision)
 
     @register
     def start_contact_bounce(
@@ -54,11 +56,7 @@ def find_kernel(precision: Precision) -> wp.Kernel:
     dJ = (e v_n - n . v_ij) / (c_i w_i + c_j w_j)
     """
     real = precision.scalar
-    Bodies, Touching, Bounces = (
-        bodies_type(precision),
-        touching_type(precision),
-        bounces_type(precision),
-    )
+    Bodies, Touching, Bounces = _types(precision)
 
     @register
     def find_contact_pushes(
@@ -92,11 +90,7 @@ def find_kernel(precision: Precision) -> wp.Kernel:
 def give_kernel(precision: Precision) -> wp.Kernel:
     """Kernel: v += w n dJ."""
     vec3, real = precision.vec3, precision.scalar
-    Bodies, Touching, Bounces = (
-        bodies_type(precision),
-        touching_type(precision),
-        bounces_type(precision),
-    )
+    Bodies, Touching, Bounces = _types(precision)
 
     @register
     def give_contact_pushes(

@@ -66,12 +66,12 @@ def add_cloth(
     """
     x = validate.rows(OWNER, "vertices", vertices, None, 3)
     faces = validate.triangles(OWNER, triangles, len(x))
-    mass = _masses(x, faces, areal_density)
+    area, pairs = areas(OWNER, x, faces), sample.edges(faces)
+    mass = _masses(faces, area, len(x), areal_density)
     mu = validate.number(OWNER, "self_friction", self_friction, minimum=0.0)
     if self_collision:
-        _closed(x, faces, radius)
-    first = scene.particle_count
-    parts = _holding(x, faces, first, stiffness, bending_stiffness, break_force)
+        _closed(x, faces, pairs, radius)
+    parts = _holding(x, faces, pairs, area, stiffness, bending_stiffness, break_force, scene)
     body = add_body(
         scene, x, parts, mass=mass, radius=radius, triangles=faces,
         pinned=held(OWNER, pinned, len(x)), velocity=velocity, group=group, color=color,
@@ -81,21 +81,20 @@ def add_cloth(
     return body
 
 
-def _masses(x: np.ndarray, faces: np.ndarray, areal_density: float) -> np.ndarray:
+def _masses(faces: np.ndarray, area: np.ndarray, count: int, areal_density: float) -> np.ndarray:
     """Of the vertices, (n,): a triangle weighs on its corners alike."""
-    share = shares(faces, areas(OWNER, x, faces), len(x))
+    share = shares(faces, area, count)
     massive(OWNER, "vertices", share)
     unit = "mass/area"
     return share * validate.number(OWNER, "areal_density", areal_density, above=0.0, unit=unit)
 
 
 def _holding(
-    x: np.ndarray, faces: np.ndarray, first: int, stiffness: float | None,
-    bending_stiffness: float, break_force: Any,
+    x: np.ndarray, faces: np.ndarray, pairs: np.ndarray, area: np.ndarray,
+    stiffness: float | None, bending_stiffness: float, break_force: Any, scene: Scene,
 ) -> dict[str, ConstraintBase]:  # fmt: skip
-    """What holds a mesh together, whose vertices are the scene's from ``first`` on."""
-    pairs = sample.edges(faces)
-    softness = _slenderness(x, pairs, faces, areas(OWNER, x, faces))
+    """What holds a mesh together, whose vertices will be the next of the scene."""
+    first, softness = scene.particle_count, _slenderness(x, pairs, faces, area)
     softness *= compliance(OWNER, "stiffness", stiffness, "force/length")
     stretch = Distance(pairs + first, compliance=softness, break_force=break_force)
     d = validate.number(OWNER, "bending_stiffness", bending_stiffness, minimum=0.0, unit="energy")
@@ -108,9 +107,8 @@ def _holding(
     return {"stretch": stretch, "bend": bend}
 
 
-def _closed(x: np.ndarray, faces: np.ndarray, radius: Any) -> None:
+def _closed(x: np.ndarray, faces: np.ndarray, pairs: np.ndarray, radius: Any) -> None:
     """Refuse radii by which ends of an edge overlap, or vertices slip through a triangle."""
-    pairs = sample.edges(faces)
     r = validate.rows(OWNER, "radius", radius, len(x), None)
     length = np.linalg.norm(x[pairs[:, 1]] - x[pairs[:, 0]], axis=1)
     overlap = r[pairs].sum(axis=1) / length

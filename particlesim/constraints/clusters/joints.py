@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,21 +11,18 @@ import warp as wp
 from ... import validate
 from ...engine import topology
 from ...engine.execution.launch import launch
-from ...engine.limit import Limit
 from ...engine.model import Model
 from ...engine.neighbors.lists import Neighbors
-from ...engine.probe import Probe
 from ...engine.state import State
 from ...kernels.constraints.clusters import joints as kernels
 from ...kernels.constraints.clusters.joint_bounce import bounce_kernel
 from ...kernels.constraints.clusters.members import Form
-from ...scene.constraint_base import ConstraintBase
-from ...scene.part import Part
 from ..tuples import bodies
+from .implicit import ImplicitClusters
 from .members import Members, checked
 
 
-class BallJoint(ConstraintBase):
+class BallJoint(ImplicitClusters):
     """A point of one cluster and a point of another, or of the world, stay together.
 
     Both points are those of the rotations that fit the clusters best, and an impulse at a point
@@ -106,6 +101,14 @@ class BallJoint(ConstraintBase):
 
     # The engine's side ------------------------------------------------------------------------
 
+    @property
+    def breakable(self) -> bool:
+        return self.break_force is not None
+
+    @property
+    def sorting(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.order, self.edges
+
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
         each = [[row for side in peer.sides for row in side] for peer in self.peers]
@@ -146,8 +149,7 @@ class BallJoint(ConstraintBase):
             return point
         members, model = self.members, self.model
         first = model.scenes[w].position[members.particles[k][0] - model.offsets[w]]
-        d, box = point - first - members.centre[k], model.box_start[w]
-        return d - box * np.round(np.divide(d, box, out=np.zeros(3), where=box > 0))
+        return topology.nearest(point - first - members.centre[k], model.box_start[w])
 
     def _angles(self) -> dict[str, np.ndarray]:
         """Axes, what is across them, and limits, of hinges."""
@@ -177,18 +179,12 @@ class BallJoint(ConstraintBase):
     def _values(self, name: str, field: str | None = None) -> dict[str, np.ndarray]:
         return {field or name: np.concatenate([getattr(peer, name) for peer in self.peers])}
 
-    def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        self.fresh = True
-
     def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if not self.count or dt <= 0:
             return
-        # Static projection: no time passes, and nothing moves of itself.
-        timed = not math.isinf(dt)
-        own, fresh = (dt if timed else 0.0), int(self.fresh)
-        self.fresh = False
+        fresh, own, timed = self._timing(dt)
         for start, end in self.spans:
-            inputs = [start, fresh, own, 1.0 / dt, float(timed), self.model.box, self.struct,
+            inputs = [start, fresh, own, 1.0 / dt, timed, self.model.box, self.struct,
                       self.clusters, self.bodies]  # fmt: skip
             launch(self.project_kernel, end - start, inputs, self.model.device)
 
@@ -201,19 +197,11 @@ class BallJoint(ConstraintBase):
             inputs = [start, self.model.box, self.struct, self.clusters, self.bodies, bounces]
             launch(bounce_kernel(self.form), end - start, inputs, self.model.device)
 
-    def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        if self.count and dt > 0 and self.break_force is not None:
-            self._strain(1, dt)
-
-    def _strain(self, may_break: int, dt: float) -> None:
+    def _strain(self, may_break: int, dt: float) -> wp.array:
+        """The force of each joint."""
         inputs = [may_break, self.struct, (1.0 / dt) ** 2, self.pull]
         launch(kernels.strain_kernel(), self.count, inputs, self.model.device)
-
-    def limits(self, probe: Probe) -> list[Limit]:
-        """None: it is implicit."""
-        return (
-            [Limit(self.name, "damping in time", math.inf, "any: implicit")] if self.count else []
-        )
+        return self.pull
 
     def persistent(self) -> dict[str, wp.array]:
         if not self.count:
@@ -225,27 +213,3 @@ class BallJoint(ConstraintBase):
 
     def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
         return self.members.world if name == "turn" else self.worlds_joined
-
-    def reset(self, worlds: Sequence[int]) -> None:
-        self.forget({**self.persistent(), **self.readable()}, worlds)
-
-    # Reading ------------------------------------------------------------------------------------
-
-    def read_force(self, part: Part) -> np.ndarray:
-        """The force of each joint in the last substep."""
-        dt = self.model.settings.substep
-        if not self.count or not dt > 0:
-            return np.zeros(self.count)
-        self._strain(0, dt)
-        return self._listed(self.pull.numpy(), part)
-
-    def read_broken(self, part: Part) -> np.ndarray:
-        marks = self.struct.broken.numpy() if self.count else np.zeros(0)
-        return self._listed(marks, part) > 0
-
-    def _listed(self, rows: np.ndarray, part: Part) -> np.ndarray:
-        """Values of the sorted joints, of the worlds of ``part``, in the order it has them."""
-        values = np.empty_like(rows)
-        values[self.order] = rows
-        mine = [w for w, peer in enumerate(self.peers) if part is self or part is peer]
-        return np.concatenate([values[self.edges[w] : self.edges[w + 1]] for w in mine])

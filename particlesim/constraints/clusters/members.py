@@ -147,13 +147,6 @@ class Members:
             result.broken = wp.zeros(self.count, dtype=wp.int32, device=device)
         return result
 
-    def listed(self, rows: np.ndarray, part: Any, bound: Any) -> np.ndarray:
-        """Values of the sorted clusters, of the worlds of ``part``, in the order it has them."""
-        values = np.empty_like(rows)
-        values[self.order] = rows
-        mine = [w for w, peer in enumerate(bound.peers) if part is bound or part is peer]
-        return np.concatenate([values[self.edges[w] : self.edges[w + 1]] for w in mine])
-
     def sizes(self) -> np.ndarray:
         """sum m q^2 of each cluster, over the members that are free, if any are."""
         free = [~self.held[row] for row in self.particles]
@@ -194,9 +187,7 @@ def _rest(
         if given is not None:
             shapes.append(given[n])
         else:
-            d = scene.position[row] - scene.position[row[0]]
-            parts = np.divide(d, box, out=np.zeros_like(d), where=box > 0)
-            shapes.append(d - box * np.round(parts))
+            shapes.append(topology.nearest(scene.position[row] - scene.position[row[0]], box))
         across = np.ptp(shapes[-1], axis=0)
         # From the first member all others are looked for as nearest images, however it turns.
         reach = float(np.linalg.norm(shapes[-1] - shapes[-1][0], axis=1).max())

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,20 +10,17 @@ import warp as wp
 from ... import validate
 from ...engine import topology
 from ...engine.execution.launch import launch
-from ...engine.limit import Limit
 from ...engine.model import Model
 from ...engine.neighbors.lists import Neighbors
-from ...engine.probe import Probe
 from ...engine.state import State
 from ...kernels.constraints.clusters import mesh_volume as kernels
 from ...kernels.constraints.clusters.members import Form
-from ...scene.constraint_base import ConstraintBase
-from ...scene.part import Part
 from ..tuples import bodies
+from .implicit import ImplicitClusters
 from .members import Members, colors
 
 
-class MeshVolume(ConstraintBase):
+class MeshVolume(ImplicitClusters):
     """C = V - p V_0: each closed mesh of triangles encloses the volume V = p V_0.
 
     V = sum over triangles of a . (b x c) / 6, solved as one constraint of all vertices (Mueller et
@@ -79,6 +74,10 @@ class MeshVolume(ConstraintBase):
 
     # The engine's side ------------------------------------------------------------------------
 
+    @property
+    def breakable(self) -> bool:
+        return self.burst_pressure is not None
+
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
         corners = [peer.corners for peer in self.peers]
@@ -102,8 +101,7 @@ class MeshVolume(ConstraintBase):
         found = np.zeros(len(self.triangles))
         x, box = model.scenes[w].position, model.box_start[w]
         for n, mesh in enumerate(self.triangles):
-            d = x[mesh] - x[mesh[0, 0]]
-            d -= box * np.round(np.divide(d, box, out=np.zeros_like(d), where=box > 0))
+            d = topology.nearest(x[mesh] - x[mesh[0, 0]], box)
             found[n] = np.einsum("ti,ti->", d[:, 0], np.cross(d[:, 1], d[:, 2])) / 6
             if self.rest_volume is None and found[n] == 0:
                 raise validate.fail(
@@ -156,36 +154,22 @@ class MeshVolume(ConstraintBase):
         face = np.cumsum(np.concatenate(counts))
         return {"face": face, "left": np.concatenate(left), "right": np.concatenate(right)}
 
-    def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        self.fresh = True
-
     def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if not self.count or dt <= 0:
             return
-        # Static projection: no time passes, and nothing moves of itself.
-        timed = not math.isinf(dt)
-        own, fresh = (dt if timed else 0.0), int(self.fresh)
-        self.fresh = False
+        fresh, own, timed = self._timing(dt)
         device, t, c, b = self.model.device, self.struct, self.clusters, self.bodies
         for start, end, first, last in self.members.spans:
-            inputs = [first, own, float(timed), self.model.box, t, c, b]
+            inputs = [first, own, timed, self.model.box, t, c, b]
             launch(self.add_up, last - first, inputs, device)
             launch(self.solve, end - start, [start, fresh, 1.0 / dt, t, c], device)
             launch(self.inflate, last - first, [first, t, c, b], device)
 
-    def finish(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        if self.count and dt > 0 and self.burst_pressure is not None:
-            self._measure(1, dt)
-
-    def _measure(self, may_break: int, dt: float) -> None:
+    def _strain(self, may_break: int, dt: float) -> wp.array:
+        """The pressure in each mesh, above 0 where it pushes outwards."""
         inputs = [may_break, self.struct, (1.0 / dt) ** 2, self.found]
         launch(kernels.pressure_kernel(), self.count, inputs, self.model.device)
-
-    def limits(self, probe: Probe) -> list[Limit]:
-        """None: it is implicit."""
-        return (
-            [Limit(self.name, "damping in time", math.inf, "any: implicit")] if self.count else []
-        )
+        return self.found
 
     def persistent(self) -> dict[str, wp.array]:
         return {"broken": self.struct.broken} if self.count else {}
@@ -195,23 +179,6 @@ class MeshVolume(ConstraintBase):
 
     def worlds(self, name: str, array: wp.array) -> np.ndarray | None:
         return self.members.world
-
-    def reset(self, worlds: Sequence[int]) -> None:
-        self.forget({**self.persistent(), **self.readable()}, worlds)
-
-    # Reading ------------------------------------------------------------------------------------
-
-    def read_force(self, part: Part) -> np.ndarray:
-        """The pressure in each mesh in the last substep, above 0 where it pushes outwards."""
-        dt = self.model.settings.substep
-        if not self.count or not dt > 0:
-            return np.zeros(self.count)
-        self._measure(0, dt)
-        return self.members.listed(self.found.numpy(), part, self)
-
-    def read_broken(self, part: Part) -> np.ndarray:
-        marks = self.struct.broken.numpy() if self.count else np.zeros(0)
-        return self.members.listed(marks, part, self) > 0
 
 
 def _meshes(value: Any) -> list[np.ndarray]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,21 +10,18 @@ import warp as wp
 from ... import validate
 from ...engine import topology
 from ...engine.execution.launch import launch
-from ...engine.limit import Limit
 from ...engine.model import Model
 from ...engine.neighbors.lists import Neighbors
-from ...engine.probe import Probe
 from ...engine.state import State
 from ...kernels.constraints.clusters import cluster_motion as motion
 from ...kernels.constraints.clusters.members import Form
 from ...kernels.constraints.clusters.shape_matching import project_kernels
-from ...scene.constraint_base import ConstraintBase
-from ...scene.part import Part
 from ..tuples import bodies
+from .implicit import ImplicitClusters
 from .members import Members, checked, colors
 
 
-class ShapeMatching(ConstraintBase):
+class ShapeMatching(ImplicitClusters):
     r"""Clusters keep their shape: rigid bodies, and soft ones that are pulled back to it.
 
     Every member goes to its goal c + R q, q its place in the rest shape from the centre of mass,
@@ -115,6 +110,10 @@ class ShapeMatching(ConstraintBase):
 
     # The engine's side ------------------------------------------------------------------------
 
+    @property
+    def breakable(self) -> bool:
+        return self.break_force is not None
+
     def prepare(self, model: Model, neighbors: Neighbors) -> None:
         self.model = model
         clusters = [peer.clusters for peer in self.peers]
@@ -130,7 +129,7 @@ class ShapeMatching(ConstraintBase):
         if not self.count:
             return
         members = self.members
-        breakable, plastic = self.break_force is not None, self.yield_strain is not None
+        breakable, plastic = self.breakable, self.yield_strain is not None
         self.bodies = bodies(model, state)
         limit = self._column("break_force") if breakable else np.zeros(0)
         softness = self._column("compliance") * members.mean
@@ -157,23 +156,17 @@ class ShapeMatching(ConstraintBase):
         self.flow = [model.array(inverse, wp.mat33d), model.array(flat, wp.mat33d),
                      model.array(flow, wp.vec3d)]  # fmt: skip
 
-    def begin(self, state: State, neighbors: Neighbors, dt: float) -> None:
-        self.fresh = True
-
     def project(self, state: State, neighbors: Neighbors, dt: float) -> None:
         if not self.count or dt <= 0:
             return
-        # Static projection: no time passes, and nothing moves of itself.
-        timed = not math.isinf(dt)
-        own, fresh = (dt if timed else 0.0), int(self.fresh)
-        self.fresh = False
+        fresh, own, timed = self._timing(dt)
         device, box, c, b = self.model.device, self.model.box, self.struct, self.bodies
         for start, end, first, last in self.members.spans:
             if last - first == end - start:  # each is one chunk
-                inputs = [start, fresh, own, 1.0 / dt, float(timed), box, c, b]
+                inputs = [start, fresh, own, 1.0 / dt, timed, box, c, b]
                 launch(self.kernels.whole, end - start, inputs, device)
                 continue
-            launch(self.kernels.add_up, last - first, [first, own, float(timed), box, c, b], device)
+            launch(self.kernels.add_up, last - first, [first, own, timed, box, c, b], device)
             launch(self.kernels.match, end - start, [start, fresh, 1.0 / dt, c, b], device)
             launch(self.kernels.draw, last - first, [first, fresh, 1.0 / dt, box, c, b], device)
 
@@ -189,12 +182,13 @@ class ShapeMatching(ConstraintBase):
                 launch(
                     motion.creep_kernel(self.form), end - start, [start, dt, *self.flow, c], device
                 )
-        if self.form.breakable:
-            self._strain(1, dt)
+        super().finish(state, neighbors, dt)
 
-    def _strain(self, may_break: int, dt: float) -> None:
+    def _strain(self, may_break: int, dt: float) -> wp.array:
+        """The largest force on a member of each cluster."""
         inputs = [may_break, self.struct, (1.0 / dt) ** 2, self.largest]
         launch(motion.strain_kernel(self.form), self.count, inputs, self.model.device)
+        return self.largest
 
     def bounce(self, state: State, neighbors: Neighbors, bounces: Any, dt: float) -> None:
         """Velocities of rigid clusters become rigid, with the same momentum and angular momentum.
@@ -224,12 +218,6 @@ class ShapeMatching(ConstraintBase):
                 launch(kernel, end - start, [*inputs, energy, stress], self.model.device)
         return True
 
-    def limits(self, probe: Probe) -> list[Limit]:
-        """None: it is implicit, and a rigid cluster keeps its angular momentum at any step."""
-        return (
-            [Limit(self.name, "damping in time", math.inf, "any: implicit")] if self.count else []
-        )
-
     def persistent(self) -> dict[str, wp.array]:
         if not self.count:
             return {}
@@ -243,21 +231,3 @@ class ShapeMatching(ConstraintBase):
         if name == "shift":
             return np.repeat(self.members.world, [len(row) for row in self.members.particles])
         return self.members.world
-
-    def reset(self, worlds: Sequence[int]) -> None:
-        self.forget({**self.persistent(), **self.readable()}, worlds)
-
-    # Reading ------------------------------------------------------------------------------------
-
-    def read_force(self, part: Part) -> np.ndarray:
-        """The largest force on a member of each cluster, in the last substep."""
-        dt = self.model.settings.substep
-        if not self.count or not dt > 0:
-            return np.zeros(self.count)
-        self._strain(0, dt)
-        return self.members.listed(self.largest.numpy(), part, self)
-
-    def read_broken(self, part: Part) -> np.ndarray:
-        known = self.count and self.form.breakable
-        marks = self.struct.broken.numpy() if known else np.zeros(self.count)
-        return self.members.listed(marks, part, self) > 0

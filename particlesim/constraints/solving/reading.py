@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ...engine import topology
 from ...scene.constraint_base import ConstraintBase
 from ...scene.part import Part
 
@@ -42,11 +43,7 @@ class ReadTuples(ConstraintBase):
 
     def _listed(self, rows: np.ndarray, part: Part) -> np.ndarray:
         """Values of the sorted rows, of the worlds of ``part``, in the order of its tuples."""
-        values = np.empty_like(rows)
-        values[self.tuples.order] = rows
-        edges = self.tuples.edges
-        mine = [w for w, peer in enumerate(self.peers) if part is self or part is peer]
-        return np.concatenate([values[edges[w] : edges[w + 1]] for w in mine])
+        return topology.listed(rows, self.tuples.order, self.tuples.edges, self, part)
 
     @property
     def force(self) -> np.ndarray:

@@ -40,7 +40,7 @@ class TupleVelocities:
         if self.constraint.tuples.damped:
             self._sweep(damp_kernel(self.solved), dt)
 
-    def start_bounce(self) -> None:
+    def prepare_bounce(self) -> None:
         """No tuple has handed on anything yet."""
         if self.push is None:
             self.push = wp.zeros_like(self.constraint.struct.lam)

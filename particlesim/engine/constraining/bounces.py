@@ -8,8 +8,9 @@ import warp as wp
 
 from ...kernels.engine.bounces import bounces_type, decide_kernel
 from ...scene.constraint_base import ConstraintBase
+from ..execution.acting import act
 from ..execution.copies import copy, zero
-from ..execution.launch import launch, owner, repeat
+from ..execution.launch import launch, owner, repeat, when
 from ..model import Model
 from ..neighbors.lists import Neighbors
 from ..observers import FINISH, Observers
@@ -31,10 +32,10 @@ class Bounces:
 
     def __init__(self, model: Model, state: State, constraints: Sequence[ConstraintBase]):
         self.model = model
-        self.here = any(each.bounces for each in constraints)
         # Impulses start where things meet, and go from there through the bodies.
         self.constraints = list(reversed(constraints))
-        if not self.here:
+        self.meeting = [each for each in self.constraints if each.bounces]
+        if not self.meeting:
             return
         worlds, device = model.world_count, model.device
         self.struct = bounces_type(model.precision)()
@@ -46,14 +47,17 @@ class Bounces:
 
     def act(self, observers: Observers, state: State, neighbors: Neighbors, dt: float) -> None:
         """What has met something bounces off, if anything does."""
-        if not self.here or dt <= 0:
+        if not self.meeting or dt <= 0:
             return
         zero(self.model, self.sweeps)
         now = state, neighbors, self.struct, dt
-        for each in self.constraints:
+        for each in self.meeting:
             observers.act(each, FINISH, each.start_bounce, *now)
-        copy(self.model, state.velocity, self.struct.before)
         self._decide()
+        with when(self.flag):
+            copy(self.model, state.velocity, self.struct.before)
+            for each in self.constraints:
+                act(each, each.prepare_bounce, *now)
         with repeat(self.flag):
             for each in self.constraints:
                 observers.act(each, FINISH, each.bounce, *now)

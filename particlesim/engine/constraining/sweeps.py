@@ -41,7 +41,8 @@ class Sweeps:
         self.rho, self.tolerance = settings.acceleration, settings.constraint_tolerance
         if not self.inner:
             self.rho = 0.0
-        self.sweeps, self.flag = (model.array(np.zeros(1), wp.int32) for _ in range(2))
+        if self.tolerance is not None:
+            self.sweeps, self.flag = (model.array(np.zeros(1), wp.int32) for _ in range(2))
         if self.rho:
             self.count, self.omega = (
                 wp.zeros(1, dtype=kind, device=device) for kind in (wp.int32, wp.float64)
@@ -68,10 +69,10 @@ class Sweeps:
             return
         zero(self.model, self.sweeps)
         self._sweep(observers, now, timed)
-        self._look(iterations, dt)
+        self._look(iterations)
         with repeat(self.flag):
             self._sweep(observers, now, timed)
-            self._look(iterations, dt)
+            self._look(iterations)
 
     def _sweep(self, observers: Observers, now: tuple[Any, ...], timed: bool) -> None:
         for constraint in self.inner:
@@ -91,10 +92,10 @@ class Sweeps:
             with owner(constraint.name):
                 act(constraint, constraint.go_on, self.count, self.omega)
 
-    def _look(self, most: int, dt: float) -> None:
+    def _look(self, most: int) -> None:
         """Is one more due?"""
         zero(self.model, self.flag)
         for constraint in self.inner:
             with owner(constraint.name):
-                act(constraint, constraint.look, self.flag, self.tolerance, dt)
+                act(constraint, constraint.look, self.flag, self.tolerance)
         launch(enough_kernel(), 1, [most, self.sweeps, self.flag], self.model.device)
